@@ -1,0 +1,1 @@
+"""Screened Poisson hyperfields for shape coding."""

@@ -1,0 +1,1 @@
+"""Codes of shapes: node features, vocabulary, VLAD, models and collections."""

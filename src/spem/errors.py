@@ -1,0 +1,61 @@
+"""The exceptions of spem; catch `SpemError` to catch them all.
+
+    SpemError
+    ├── ReadError           a file that cannot be read as a shape, a model or codes
+    ├── ShapeError          a shape that cannot carry a field
+    ├── SizeError           a grid or an image over the memory limit
+    ├── ParameterError      an argument out of its range (also a ValueError)
+    ├── LabelError          labels that do not fit the shapes they label
+    ├── ModelError          codes, a vocabulary or a query that do not belong together
+    └── ConvergenceError    an iteration that missed its tolerance; carries the best iterate
+
+Each message is one line: what is wrong, where, what was expected, what to do.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class SpemError(Exception):
+    """Base class of every error that spem raises on purpose."""
+
+
+class ReadError(SpemError):
+    """A file that is missing, empty, truncated or of a kind that spem cannot read."""
+
+
+class ShapeError(SpemError):
+    """A shape on which no field can be computed."""
+
+
+class SizeError(SpemError):
+    """An image or grid that would need more memory than the limit, refused before allocation."""
+
+
+class ParameterError(SpemError, ValueError):
+    """An argument out of its range."""
+
+
+class LabelError(SpemError):
+    """Labels that do not fit the shapes."""
+
+
+class ModelError(SpemError):
+    """Codes, a vocabulary or a query that were not made by the same model."""
+
+
+class ConvergenceError(SpemError):
+    """An iterative solve that missed its tolerance.
+
+    Parameters
+    ----------
+    message
+        One line: what was reached, what was asked, what to do.
+    solution
+        The outcome of the failed solve, with its best iterate, residual and iteration count.
+    """
+
+    def __init__(self, message: str, solution: Any = None) -> None:
+        super().__init__(message)
+        self.solution = solution

@@ -1,0 +1,1 @@
+"""Shape to fields: domain, screened operator, solvers and the hyperfield over ρ."""

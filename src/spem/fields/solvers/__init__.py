@@ -1,0 +1,1 @@
+"""Solvers of the screened Poisson system, one idea a file."""

@@ -1,0 +1,1 @@
+"""SPEM maps: principal components of the hyperfield over ρ."""

@@ -1,0 +1,1 @@
+"""Pictures and reports; each function takes a value object and an axis and returns artists."""
