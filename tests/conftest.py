@@ -1,0 +1,17 @@
+"""Fixtures shared by all tests."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """Return the folder of real shapes: SPEM_DATA, or ../shared/data beside the repository."""
+    root = Path(os.environ.get("SPEM_DATA", Path(__file__).parents[2] / "shared" / "data"))
+    if not root.is_dir():
+        pytest.skip(f"no real shapes: {root} is absent; set SPEM_DATA to the folder that holds them")
+    return root
