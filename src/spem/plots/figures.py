@@ -1,0 +1,255 @@
+"""Figures with a panel for each field or each map of a shape of any dimension that can be drawn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+
+from spem.errors import ParameterError
+from spem.plots.camera import principal_view, view_rotation
+from spem.plots.fields import draw_line, draw_outline, draw_slice, draw_values
+from spem.plots.raster import render_surface
+from spem.plots.style import FIELD_CMAP, MAP_CMAP, MUTED, TEXT_SIZE, bare, panels
+from spem.plots.surfaces import shape_surface, surface_values
+from spem.plots.values import node_columns, value_limits
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike, NDArray
+
+    from spem.maps.spem import Maps
+    from spem.plots.camera import View
+    from spem.shapes.shape import Shape
+
+PANEL_PIXELS = (420, 420)
+
+
+def figure_fields(
+    shape: Shape,
+    values: ArrayLike,
+    titles: Sequence[str] | None = None,
+    *,
+    contours: bool = True,
+    view: View | None = None,
+    columns: int = 5,
+) -> Figure:
+    """Return a figure with a panel for each field, all on one colour scale from 0 to 1.
+
+    One-dimensional shapes are drawn as curves, two-dimensional ones as images, three-dimensional
+    ones cut open.
+
+    Parameters
+    ----------
+    shape
+        The shape.
+    values
+        ``(n_nodes, n_fields)`` or ``(n_nodes,)`` fields.
+    titles
+        One title a panel.
+    contours
+        Whether to draw lines of equal value in images.
+    view
+        View of three-dimensional shapes; their broad side by default.
+    columns
+        Most panels in a row.
+
+    Raises
+    ------
+    ShapeError
+        If the shape has more than three dimensions.
+    ParameterError
+        If the titles do not match the fields.
+
+    Examples
+    --------
+    >>> from spem.shapes.shape import Shape
+    >>> figure = figure_fields(Shape.from_mask(np.ones((3, 3))), np.ones((9, 2)), ["ρ = 1", "ρ = 2"])
+    >>> [ax.get_title() for ax in figure.axes[:2]]
+    ['ρ = 1', 'ρ = 2']
+    """
+    fields = node_columns(shape, values)
+    n_fields = fields.shape[1]
+    captions = _titles(titles, n_fields)
+    figure, axes = panels(n_fields, columns=columns)
+    limits = [(0.0, 1.0)] * n_fields
+    _fill(shape, fields, axes, limits, symmetric=False, contours=contours, view=view)
+    _caption(shape, axes, captions)
+    if shape.ndim > 1:
+        _colour_bar(figure, axes, FIELD_CMAP, (0.0, 1.0), ["0", "v", "1"])
+    return figure
+
+
+def figure_maps(
+    maps: Maps, *, n_maps: int | None = None, view: View | None = None, columns: int = 5
+) -> Figure:
+    """Return a figure with a panel for each SPEM map, each coloured about zero on its own scale.
+
+    Parameters
+    ----------
+    maps
+        The maps of one shape.
+    n_maps
+        Number of leading maps to draw; all by default.
+    view
+        View of three-dimensional shapes; their broad side by default.
+    columns
+        Most panels in a row.
+
+    Raises
+    ------
+    ShapeError
+        If the shape has more than three dimensions.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from spem.shapes.shape import Shape
+    >>> shape = Shape.from_mask(np.ones((3, 3)))
+    >>> maps = SimpleNamespace(shape=shape, values=np.ones((9, 2)), explained=np.array([0.99, 0.01]))
+    >>> figure_maps(maps).axes[0].get_title()
+    'P₁  99 %'
+    """
+    values = node_columns(maps.shape, maps.values)[:, :n_maps]
+    figure, axes = panels(values.shape[1], columns=columns)
+    limits = [value_limits(column, symmetric=True) for column in values.T]
+    _fill(maps.shape, values, axes, limits, symmetric=True, contours=False, view=view)
+    titles = [f"{map_name(j)}  {_percent(maps.explained[j])}" for j in range(values.shape[1])]
+    _caption(maps.shape, axes, titles)
+    if maps.shape.ndim > 1:
+        _colour_bar(figure, axes, MAP_CMAP, (-1.0, 1.0), ["−", "0", "+"])
+    return figure
+
+
+def figure_slices(shape: Shape, values: ArrayLike, *, symmetric: bool = False) -> Figure:
+    """Return a figure with the three slices through the median node of a volume.
+
+    Parameters
+    ----------
+    shape
+        A three-dimensional shape.
+    values
+        ``(n_nodes,)`` one value a node.
+    symmetric
+        Whether values are signed, coloured about zero.
+
+    Raises
+    ------
+    ShapeError
+        If the shape is not three-dimensional.
+
+    Examples
+    --------
+    >>> from spem.shapes.shape import Shape
+    >>> len(figure_slices(Shape.from_mask(np.ones((3, 3, 3))), np.ones(27)).axes)
+    3
+    """
+    figure, axes = panels(3, width=2.2, height=2.2)
+    for axis, ax in enumerate(axes):
+        draw_slice(shape, values, ax, axis=axis, symmetric=symmetric)
+        down, right = (a for a in range(3) if a != axis)
+        bare(ax, f"axis {down} ↓  axis {right} →")
+    return figure
+
+
+def map_name(j: int) -> str:
+    """Return the symbol of map `j`, counted from zero.
+
+    Examples
+    --------
+    >>> map_name(11)
+    'P₁₂'
+    """
+    return "P" + str(j + 1).translate(str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"))
+
+
+def _fill(
+    shape: Shape,
+    values: NDArray[np.float64],
+    axes: list[Axes],
+    limits: list[tuple[float, float]],
+    *,
+    symmetric: bool,
+    contours: bool,
+    view: View | None,
+) -> None:
+    """Draw a column of values on each axis, in the way of the shape's dimension."""
+    if shape.ndim == 3:
+        _fill_surfaces(shape, values, axes, limits, MAP_CMAP if symmetric else FIELD_CMAP, view)
+        return
+    for ax, column, ends in zip(axes, values.T, limits, strict=True):
+        if shape.ndim == 1:
+            draw_line(shape, column, ax)
+            if not symmetric:
+                ax.set_ylim(-0.02, 1.05)
+        else:
+            draw_values(shape, column, ax, symmetric=symmetric, limits=ends, contours=contours)
+            draw_outline(shape, ax, width=0.7)
+
+
+def _fill_surfaces(
+    shape: Shape,
+    values: NDArray[np.float64],
+    axes: list[Axes],
+    limits: list[tuple[float, float]],
+    cmap: str,
+    view: View | None,
+) -> None:
+    """Draw each column on one surface, cut open across the axis that faces the viewer most."""
+    rotation = principal_view(shape.points) if view is None else view_rotation(view)
+    surface = shape_surface(shape, int(np.abs(rotation[2]).argmax()), toward=rotation[2])
+    for ax, column, ends in zip(axes, values.T, limits, strict=True):
+        picture = render_surface(
+            surface.vertices,
+            surface.faces,
+            surface_values(shape, surface, column),
+            view=rotation,
+            size=PANEL_PIXELS,
+            cmap=cmap,
+            limits=ends,
+        )
+        ax.imshow(picture, interpolation="antialiased")
+        bare(ax)
+
+
+def _titles(titles: Sequence[str] | None, n_panels: int) -> list[str]:
+    """One title a panel."""
+    if titles is None:
+        return [""] * n_panels
+    if len(titles) != n_panels:
+        msg = f"{n_panels} fields need as many titles, not {len(titles)}"
+        raise ParameterError(msg)
+    return list(titles)
+
+
+def _caption(shape: Shape, axes: list[Axes], titles: list[str]) -> None:
+    """Write the titles; curves keep their axes."""
+    for ax, title in zip(axes, titles, strict=True):
+        if shape.ndim == 1:
+            ax.set_title(title, fontsize=TEXT_SIZE)
+        else:
+            bare(ax, title)
+
+
+def _percent(fraction: float) -> str:
+    """Write a fraction as a percentage with as many digits as it takes to tell it from 0 and 100."""
+    percent = 100 * float(fraction)
+    if 99.5 <= percent < 100 or percent < 1:
+        return f"{percent:.2g} %" if percent < 1 else f"{min(percent, 99.99):.2f} %"
+    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.1f} %"
+
+
+def _colour_bar(
+    figure: Figure, axes: list[Axes], cmap: str, limits: tuple[float, float], words: list[str]
+) -> None:
+    """Draw one slim scale for all panels."""
+    scale = ScalarMappable(Normalize(*limits), cmap)
+    bar = figure.colorbar(scale, ax=axes, fraction=0.03, pad=0.015, aspect=28, shrink=0.8)
+    bar.set_ticks(list(np.linspace(*limits, 3)), labels=words)
+    bar.ax.tick_params(length=0, labelsize=TEXT_SIZE, labelcolor=MUTED)
+    bar.outline.set_visible(False)

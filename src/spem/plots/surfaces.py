@@ -1,0 +1,248 @@
+"""Surfaces of three-dimensional shapes, whole or cut open, with node values on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+from scipy.spatial import cKDTree
+from skimage.measure import marching_cubes
+
+from spem.errors import ParameterError, ShapeError
+from spem.plots.camera import principal_view, view_rotation
+from spem.plots.level import surface_level
+from spem.plots.raster import render_surface, vertex_normals
+from spem.plots.style import FIELD_CMAP, MAP_CMAP, bare
+from spem.plots.values import node_values, value_limits
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.image import AxesImage
+    from numpy.typing import ArrayLike, NDArray
+
+    from spem.plots.camera import View
+    from spem.shapes.shape import Shape
+
+# Values are read this many voxels below the surface, where fields differ from their boundary value.
+SAMPLE_DEPTH = 1.0
+# Level beyond a section: so low that the section lies on its plane of nodes to rounding.
+FAR_OUTSIDE = -1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A triangle mesh around a shape and where its colours are read.
+
+    Parameters
+    ----------
+    vertices
+        ``(n_vertices, 3)`` coordinates, in the shape's own coordinates.
+    faces
+        ``(n_faces, 3)`` vertex numbers, counter-clockwise seen from outside.
+    samples
+        ``(n_vertices, 3)`` grid index, with fractions, where values are read.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    samples: NDArray[np.float64]
+
+
+def shape_surface(shape: Shape, cut: int | None = None, *, toward: ArrayLike = (1.0, 1.0, 1.0)) -> Surface:
+    """Return a smooth surface of a shape by marching cubes, whole or cut open by a plane.
+
+    Parameters
+    ----------
+    shape
+        A three-dimensional shape.
+    cut
+        Axis across which the shape is cut through its median node, or None.
+    toward
+        ``(3,)`` direction to the viewer; the half on that side is taken away.
+
+    Raises
+    ------
+    ShapeError
+        If the shape is not three-dimensional.
+    ParameterError
+        If `cut` is no axis.
+
+    Examples
+    --------
+    >>> from spem.shapes.shape import Shape
+    >>> surface = shape_surface(Shape.from_mask(np.ones((3, 3, 3))))
+    >>> surface.vertices.shape[1], bool(np.abs(surface.vertices - 1).max() < 1.8)
+    (3, True)
+    """
+    if shape.ndim != 3:
+        msg = f"{shape.name}: a surface is drawn of a shape of 3 dimensions, this one has {shape.ndim}"
+        raise ShapeError(msg)
+    level = surface_level(shape)
+    first = np.zeros(3)
+    section = 0
+    if cut is not None:
+        level, first, section = _open_level(shape, level, cut, float(np.asarray(toward)[cut]))
+    index, faces, _, _ = marching_cubes(level, 0.0, gradient_direction="ascent")
+    index, faces = index.astype(np.float64) + first, faces.astype(np.int64)
+    if cut is not None:
+        on_section = np.abs(index[:, cut] - section) < 1e-3
+        index[on_section, cut] = section
+        index, faces = _split_rim(index, faces, on_section)
+    spacing = np.asarray(shape.spacing)
+    vertices = np.asarray(shape.origin) + index * spacing
+    inward = -vertex_normals(vertices, faces) * min(shape.spacing) / spacing
+    samples = index + SAMPLE_DEPTH * inward
+    if cut is not None:
+        samples = np.where((index[:, cut] == section)[:, None], index, samples)
+    return Surface(vertices, faces, samples)
+
+
+def surface_values(shape: Shape, surface: Surface, values: ArrayLike) -> NDArray[np.float64]:
+    """Return the values that a surface shows: interpolated between the nodes just inside it.
+
+    Parameters
+    ----------
+    shape
+        The shape the surface was made of.
+    surface
+        From `shape_surface`.
+    values
+        ``(n_nodes,)`` one value a node.
+
+    Returns
+    -------
+    vertex_values
+        ``(n_vertices,)``; on a section, the values on its plane.
+
+    Examples
+    --------
+    >>> from spem.shapes.shape import Shape
+    >>> shape = Shape.from_mask(np.ones((3, 3, 3)))
+    >>> surface_values(shape, shape_surface(shape), np.full(27, 0.5)).round(6).max()
+    np.float64(0.5)
+    """
+    nodal = node_values(shape, values)
+    where = surface.samples.T
+    share = map_coordinates(shape.mask.astype(np.float64), where, order=1, mode="constant")
+    total = map_coordinates(shape.to_grid(nodal, fill=0.0), where, order=1, mode="constant")
+    shown: NDArray[np.float64] = total / np.maximum(share, 1e-12)
+    lost = share < 1e-3
+    if lost.any():
+        nodes = np.stack(np.unravel_index(shape.voxels, shape.mask.shape), axis=1)
+        shown[lost] = nodal[cKDTree(nodes).query(surface.samples[lost])[1]]
+    return shown
+
+
+def picture_surface(
+    shape: Shape,
+    values: ArrayLike | None = None,
+    *,
+    view: View | None = None,
+    cut: int | None = None,
+    symmetric: bool = False,
+    limits: tuple[float, float] | None = None,
+    size: tuple[int, int] = (320, 320),
+) -> NDArray[np.uint8]:
+    """Return a shaded picture of a shape, coloured by node values, whole or cut open.
+
+    Parameters
+    ----------
+    shape
+        A three-dimensional shape.
+    values
+        ``(n_nodes,)`` values just below the surface and on the section, or None for one colour.
+    view
+        Elevation and azimuth in degrees, a rotation, or None to look at the broad side.
+    cut
+        Axis across which to cut the shape open, -1 for the one that faces the viewer most, or None.
+    symmetric
+        Whether values are signed, coloured about zero.
+    limits
+        Values at the ends of the colour map; by default those of the values.
+    size
+        Width and height in pixels.
+
+    Returns
+    -------
+    picture
+        ``(height, width, 4)`` bytes on a transparent ground.
+
+    Examples
+    --------
+    >>> from spem.shapes.shape import Shape
+    >>> picture_surface(Shape.from_mask(np.ones((3, 3, 3))), size=(32, 32)).shape
+    (32, 32, 4)
+    """
+    rotation = principal_view(shape.points) if view is None else view_rotation(view)
+    axis = int(np.abs(rotation[2]).argmax()) if cut == -1 else cut
+    surface = shape_surface(shape, axis, toward=rotation[2])
+    shown = None if values is None else surface_values(shape, surface, values)
+    if values is not None and limits is None:
+        limits = value_limits(values, symmetric=symmetric)
+    return render_surface(
+        surface.vertices,
+        surface.faces,
+        shown,
+        view=rotation,
+        size=size,
+        cmap=MAP_CMAP if symmetric else FIELD_CMAP,
+        limits=limits,
+    )
+
+
+def draw_surface(
+    shape: Shape,
+    values: ArrayLike | None,
+    ax: Axes,
+    *,
+    view: View | None = None,
+    cut: int | None = None,
+    symmetric: bool = False,
+    limits: tuple[float, float] | None = None,
+) -> AxesImage:
+    """Draw a shaded shape on an axis; the arguments are those of `picture_surface`.
+
+    Examples
+    --------
+    >>> from spem.plots.values import node_values, value_limits
+    from spem.plots.style import new_figure
+    >>> from spem.shapes.shape import Shape
+    >>> ax = new_figure(2, 2).add_subplot()
+    >>> draw_surface(Shape.from_mask(np.ones((3, 3, 3))), None, ax).get_array().shape
+    (480, 480, 4)
+    """
+    picture = picture_surface(
+        shape, values, view=view, cut=cut, symmetric=symmetric, limits=limits, size=(480, 480)
+    )
+    bare(ax)
+    return ax.imshow(picture, interpolation="antialiased")
+
+
+def _open_level(
+    shape: Shape, level: NDArray[np.float64], cut: int, toward: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
+    """Level of the half away from the viewer, the index of its first node, and that of the section."""
+    if not 0 <= cut < 3:
+        msg = f"{shape.name}: cut must be an axis, 0, 1 or 2, not {cut}"
+        raise ParameterError(msg)
+    section = int(np.median(np.unravel_index(shape.voxels, shape.mask.shape)[cut]))
+    kept = slice(0, section + 1) if toward >= 0 else slice(section, None)
+    pad = [(0, 0)] * 3
+    pad[cut] = (0, 1) if toward >= 0 else (1, 0)
+    first = np.zeros(3)
+    first[cut] = 0 if toward >= 0 else section - 1
+    half = level[(*(slice(None),) * cut, kept)]
+    return np.pad(half, pad, constant_values=FAR_OUTSIDE), first, section
+
+
+def _split_rim(
+    index: NDArray[np.float64], faces: NDArray[np.int64], on_section: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Give the section vertices of its own, so that its rim is a sharp edge."""
+    section = on_section[faces].all(axis=1)
+    used, renumbered = np.unique(faces[section], return_inverse=True)
+    faces = faces.copy()
+    faces[section] = len(index) + renumbered.reshape(-1, 3)
+    return np.concatenate([index, index[used]]), faces
