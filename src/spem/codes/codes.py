@@ -1,0 +1,192 @@
+"""The codes of a collection, with the names of its shapes and the model they were made with."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.codes.container import read_container, write_container
+from spem.codes.model import Model
+from spem.errors import ModelError, ParameterError, ReadError
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A file that got no code.
+
+    Parameters
+    ----------
+    path
+        The file.
+    reason
+        The message of the error.
+    """
+
+    path: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Codes:
+    """Codes of the shapes of a collection.
+
+    Parameters
+    ----------
+    names
+        ``(n_shapes,)`` names for people.
+    paths
+        ``(n_shapes,)`` files, as they were given.
+    hashes
+        ``(n_shapes,)`` SHA-256 of each file's bytes, in hex: equal files are told by it.
+    vectors
+        ``(n_shapes, n_code)`` codes.
+    model
+        What they were made with.
+    failures
+        Files of the collection that got no code, and why.
+    """
+
+    names: tuple[str, ...]
+    paths: tuple[str, ...]
+    hashes: tuple[str, ...]
+    vectors: NDArray[np.float32]
+    model: Model
+    failures: tuple[Failure, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vectors", np.ascontiguousarray(self.vectors, np.float32))
+        for field in ("names", "paths", "hashes", "failures"):
+            object.__setattr__(self, field, tuple(getattr(self, field)))
+        expected = (len(self.names), self.model.n_code)
+        if self.vectors.shape != expected or not len(self.names) == len(self.paths) == len(self.hashes):
+            msg = (
+                f"{len(self.names)} names, {len(self.paths)} paths, {len(self.hashes)} hashes and vectors "
+                f"{self.vectors.shape}; expected one of each a shape and vectors {expected}"
+            )
+            raise ParameterError(msg)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def require_same_model(self, other: Codes | Model, name: str = "the query") -> None:
+        """Refuse codes that cannot be compared with these.
+
+        Parameters
+        ----------
+        other
+            Codes, or the model that a query is to be coded with.
+        name
+            What to call `other` in the message.
+
+        Raises
+        ------
+        ModelError
+            When `other` was made with another vocabulary, settings or version.
+        """
+        model = other.model if isinstance(other, Codes) else other
+        if model.digest == self.model.digest:
+            return
+        mine, theirs = self.model.settings.to_json(), model.settings.to_json()
+        odd = [f"{key} {theirs[key]} against {mine[key]}" for key in mine if mine[key] != theirs[key]]
+        why = "; ".join(odd) or "the same settings but another vocabulary"
+        msg = (
+            f"{name} has model {model.digest}, these codes have {self.model.digest} ({why}); "
+            "make both with one model"
+        )
+        raise ModelError(msg)
+
+    def take(self, index: Sequence[int] | NDArray[np.integer]) -> Codes:
+        """Return the codes of some shapes, in the given order, without the failures."""
+        rows = [int(i) for i in index]
+        names, paths, hashes = (
+            tuple(column[i] for i in rows) for column in (self.names, self.paths, self.hashes)
+        )
+        return replace(self, names=names, paths=paths, hashes=hashes, vectors=self.vectors[rows], failures=())
+
+    def join(self, other: Codes) -> Codes:
+        """Return these codes followed by others of the same model.
+
+        Raises
+        ------
+        ModelError
+            When the models differ.
+        """
+        self.require_same_model(other, "the second collection")
+        return Codes(
+            self.names + other.names,
+            self.paths + other.paths,
+            self.hashes + other.hashes,
+            np.concatenate([self.vectors, other.vectors]),
+            self.model,
+            self.failures + other.failures,
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write codes and model to one file, in one step."""
+        header = {
+            "names": list(self.names),
+            "paths": list(self.paths),
+            "hashes": list(self.hashes),
+            "failures": [[failure.path, failure.reason] for failure in self.failures],
+            "settings": self.model.settings.to_json(),
+        }
+        write_container(path, "codes", header, {"vectors": self.vectors, **self.model.to_arrays("model.")})
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read codes.
+
+        Raises
+        ------
+        ReadError
+            When the file is missing, truncated, changed, or holds no codes.
+        ModelError
+            When it was made by another version of the method.
+        """
+        header, arrays = read_container(path, "codes")
+        model = Model.from_arrays(header.get("settings", {}), arrays, str(path), "model.")
+        try:
+            names, paths, hashes = (tuple(header[key]) for key in ("names", "paths", "hashes"))
+            failures = tuple(Failure(*entry) for entry in header["failures"])
+            return cls(names, paths, hashes, arrays["vectors"], model, failures)
+        except (KeyError, TypeError, ParameterError) as error:
+            msg = f"{path}: not whole codes ({error}); make it again"
+            raise ReadError(msg) from error
+
+    def __repr__(self) -> str:
+        return f"Codes({len(self)} shapes, {len(self.failures)} failures, {self.model!r})"
+
+
+def file_hash(path: str | os.PathLike[str]) -> str:
+    """Return the SHA-256 of a file's bytes, in hex.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Raises
+    ------
+    ReadError
+        When it cannot be read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.NamedTemporaryFile() as empty:
+    ...     file_hash(empty.name)[:12]
+    'e3b0c44298fc'
+    """
+    try:
+        with Path(path).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        msg = f"{path}: cannot be read ({error.strerror}); give a file that exists"
+        raise ReadError(msg) from error

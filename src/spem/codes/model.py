@@ -1,0 +1,155 @@
+"""The model: settings and learnt arrays, enough to give any new shape a code that fits the others."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.codes.bands import as_bands
+from spem.codes.container import content_hash, read_container, write_container
+from spem.codes.settings import Settings
+from spem.codes.vlad import VLAD, encode
+from spem.errors import ModelError, ParameterError
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Settings, deviations and vocabularies.
+
+    Parameters
+    ----------
+    settings
+        How a file becomes a code.
+    deviations
+        For each band ``(n_maps,)`` weights of the projections.
+    centers
+        For each band ``(n_centers, n_maps)`` vocabulary.
+    """
+
+    settings: Settings
+    deviations: tuple[NDArray[np.float64], ...]
+    centers: tuple[NDArray[np.float32], ...]
+
+    def __post_init__(self) -> None:
+        s = self.settings
+        shapes = [weights.shape for weights in self.deviations]
+        shapes += [words.shape for words in self.centers]
+        n_bands = len(s.rho_ranges)
+        if shapes != [(s.n_maps,)] * n_bands + [(s.n_centers, s.n_maps)] * n_bands:
+            msg = f"a model of {n_bands} bands, {s.n_centers} centres and {s.n_maps} maps got arrays {shapes}"
+            raise ModelError(msg)
+
+    @classmethod
+    def fit(cls, settings: Settings, shapes: Iterable[Any]) -> Self:
+        """Learn deviations and vocabularies from the maps of shapes.
+
+        Parameters
+        ----------
+        settings
+            How the maps were made and the codes are to be.
+        shapes
+            For each shape a tuple with the ``(n_nodes, n_maps)`` maps of each band; a generator
+            is read once.
+
+        Examples
+        --------
+        >>> rng = np.random.default_rng(0)
+        >>> settings = Settings(n_maps=2, n_centers=4)
+        >>> Model.fit(settings, [rng.random((50, 2)) for _ in range(3)])
+        Model(..., 1 band, 4 centres, 2 maps, codes of length 8)
+        """
+        learner = VLAD(
+            settings.n_centers,
+            power=settings.power,
+            nodes_per_shape=settings.nodes_per_shape,
+            scale=settings.scale,
+            random_state=settings.seed,
+        ).fit(shapes)
+        centers = (words.cluster_centers_.astype(np.float32) for words in learner.vocabularies_)
+        return cls(settings, tuple(learner.deviations_), tuple(centers))
+
+    @property
+    def n_code(self) -> int:
+        """Length of a code."""
+        return sum(centers.size for centers in self.centers)
+
+    @cached_property
+    def digest(self) -> str:
+        """Twelve hex digits that name this model: equal settings and arrays have equal digests."""
+        return content_hash({"settings": self.settings.to_json()}, self.to_arrays())[:12]
+
+    def encode(self, maps: Any, name: str = "shape") -> NDArray[np.float32]:
+        """Make the code of a shape.
+
+        Parameters
+        ----------
+        maps
+            A tuple with the ``(n_nodes, n_maps)`` maps of each band, or one array for one band.
+        name
+            What to call the shape in messages.
+
+        Returns
+        -------
+        NDArray
+            ``(n_code,)`` code of unit L2 norm.
+
+        Raises
+        ------
+        ParameterError
+            When the maps are not finite or not of the model's bands.
+        """
+        bands = as_bands(maps, name)
+        found, expected = [m.shape[1] for m in bands], [len(weights) for weights in self.deviations]
+        if found != expected:
+            msg = f"{name} has {found} maps in its bands, model {self.digest} expects {expected}"
+            raise ParameterError(msg)
+        return encode(bands, self.deviations, self.centers, self.settings.power).astype(np.float32)
+
+    def to_arrays(self, prefix: str = "") -> dict[str, NDArray[Any]]:
+        """Return the learnt arrays by name, for a file."""
+        named = {f"{prefix}deviations.{band}": array for band, array in enumerate(self.deviations)}
+        return named | {f"{prefix}centers.{band}": array for band, array in enumerate(self.centers)}
+
+    @classmethod
+    def from_arrays(
+        cls, settings: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], source: str, prefix: str = ""
+    ) -> Self:
+        """Make a model of what `Settings.to_json` and `to_arrays` gave."""
+        checked = Settings.from_json(settings, source)
+        bands = range(len(checked.rho_ranges))
+        try:
+            deviations = tuple(arrays[f"{prefix}deviations.{band}"] for band in bands)
+            return cls(checked, deviations, tuple(arrays[f"{prefix}centers.{band}"] for band in bands))
+        except KeyError as error:
+            msg = f"{source}: the model lacks the array {error}; make it again"
+            raise ModelError(msg) from error
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the model to a file, in one step."""
+        write_container(path, "model", {"settings": self.settings.to_json()}, self.to_arrays())
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a model.
+
+        Raises
+        ------
+        ReadError
+            When the file is missing, truncated, changed, or no model.
+        ModelError
+            When it was made by another version of the method.
+        """
+        header, arrays = read_container(path, "model")
+        return cls.from_arrays(header.get("settings", {}), arrays, str(path))
+
+    def __repr__(self) -> str:
+        s, n_bands = self.settings, len(self.centers)
+        bands = f"{n_bands} band{'s' if n_bands > 1 else ''}"
+        size = f"{s.n_centers} centres, {s.n_maps} maps, codes of length {self.n_code}"
+        return f"Model({self.digest}, {bands}, {size})"

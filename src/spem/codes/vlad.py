@@ -1,0 +1,218 @@
+"""VLAD: one vector of fixed length for the node features of a shape (5.1)-(5.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Self
+
+import numpy as np
+from numpy.random import RandomState
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator, ClassNamePrefixFeaturesOutMixin, TransformerMixin
+from sklearn.utils import check_random_state
+from sklearn.utils.validation import check_is_fitted
+
+from spem.codes.bands import Bands, iterate_bands
+from spem.codes.normalise import relative_deviations, unit_rms
+from spem.codes.vocabulary import Vocabulary, residual_sums
+from spem.errors import ParameterError
+
+
+def vlad(
+    features: NDArray[np.floating], centers: NDArray[np.floating], power: float = 0.25
+) -> NDArray[np.float64]:
+    """Aggregate the node features of one shape against a vocabulary: (5.1)-(5.3).
+
+    Each node goes to its nearest centre, the differences are summed per centre, each sum is
+    brought to unit L2 norm and then to sign(R) |R| ** power, and the whole to unit L2 norm. A
+    centre without a node, or whose differences cancel, has zeros.
+
+    Parameters
+    ----------
+    features
+        ``(n_nodes, n_features)`` node features.
+    centers
+        ``(n_centers, n_features)`` vocabulary.
+    power
+        Exponent α of (5.3), in [0, 1].
+
+    Returns
+    -------
+    NDArray
+        ``(n_centers * n_features,)`` code, centre by centre.
+
+    Examples
+    --------
+    >>> vlad(np.array([[0.0, 0.0], [0.3, 0.4]]), np.array([[0.0, 0.0], [5.0, 5.0]]), power=1.0)
+    array([0.6, 0.8, 0. , 0. ])
+    """
+    residuals = residual_sums(features, centers)  # (n_centers, n_features)
+    residuals /= _length(residuals, axis=1)
+    code = np.sign(residuals) * np.abs(residuals) ** power
+    return np.asarray((code / _length(code)).ravel())
+
+
+def encode(
+    bands: Bands,
+    deviations: Sequence[NDArray[np.floating]],
+    centers: Sequence[NDArray[np.floating]],
+    power: float = 0.25,
+) -> NDArray[np.float64]:
+    """Make the code of one shape from its maps, one band of ρ after the other.
+
+    The maps of each band are brought to `unit_rms` and weighted by the deviations; the `vlad`
+    vectors of the bands are concatenated, and the whole has unit L2 norm.
+
+    Parameters
+    ----------
+    bands
+        For each band ``(n_nodes, n_maps)`` maps of the shape.
+    deviations
+        For each band ``(n_maps,)`` weights of the projections.
+    centers
+        For each band ``(n_centers, n_maps)`` vocabulary.
+    power
+        Exponent α of (5.3).
+
+    Returns
+    -------
+    NDArray
+        ``(n_code,)`` code, n_code = Σ n_centers · n_maps over the bands.
+
+    Examples
+    --------
+    >>> maps, weights, words = np.array([[3.0], [4.0]]), np.ones(1), np.zeros((1, 1))
+    >>> encode((maps, -maps), (weights, weights), (words, words)).round(3)
+    array([ 0.707, -0.707])
+    """
+    code = np.concatenate(
+        [
+            vlad(unit_rms(maps) * weights.astype(maps.dtype), words, power)
+            for maps, weights, words in zip(bands, deviations, centers, strict=True)
+        ]
+    )
+    return np.asarray(code / _length(code))
+
+
+class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  # type: ignore[misc]
+    """Learn deviations and a vocabulary for each band of ρ, and code shapes with them.
+
+    `fit` and `transform` take an iterable with one entry a shape: its maps ``(n_nodes, n_maps)``,
+    or a tuple of such arrays, one a band, over the same nodes. Shapes may differ in their number
+    of nodes. One map may be given as ``(n_nodes,)``, so that a two-dimensional array is a
+    collection of shapes of one map each.
+
+    Parameters
+    ----------
+    n_centers
+        Number of centres of each band's vocabulary.
+    power
+        Exponent α of (5.3), in [0, 1].
+    nodes_per_shape
+        Number of nodes drawn from each shape for training, without replacement.
+    scale
+        Whether projections are weighted by their deviations; with False all weigh the same.
+    n_init
+        Number of k-means++ starts for each vocabulary.
+    random_state
+        Seed or generator of the draw and of the starts.
+
+    Attributes
+    ----------
+    deviations_
+        For each band ``(n_maps,)`` weights of the projections.
+    vocabularies_
+        For each band the fitted `Vocabulary`.
+    n_maps_
+        For each band the number of maps.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> shapes = [rng.random((n, 2)) for n in (30, 40, 50)]
+    >>> VLAD(n_centers=4, random_state=0).fit_transform(shapes).shape
+    (3, 8)
+    """
+
+    def __init__(
+        self,
+        n_centers: int = 32,
+        *,
+        power: float = 0.25,
+        nodes_per_shape: int = 2000,
+        scale: bool = True,
+        n_init: int = 1,
+        random_state: int | RandomState | None = None,
+    ) -> None:
+        self.n_centers = n_centers
+        self.power = power
+        self.nodes_per_shape = nodes_per_shape
+        self.scale = scale
+        self.n_init = n_init
+        self.random_state = random_state
+
+    def fit(self, X: Iterable[Any], y: Any = None) -> Self:
+        """Learn deviations and vocabularies from the maps of the shapes `X`; `y` is ignored."""
+        self._check_parameters()
+        random = check_random_state(self.random_state)
+        raw, unit = _draw(iterate_bands(X), self.nodes_per_shape, random)
+        self.n_maps_ = tuple(samples[0].shape[1] for samples in raw)
+        self.deviations_, self.vocabularies_ = [], []
+        for band, n_maps in enumerate(self.n_maps_):
+            weights = relative_deviations(raw[band]) if self.scale else np.ones(n_maps)
+            nodes = np.concatenate(unit[band]) * weights.astype(unit[band][0].dtype)
+            seed = random.randint(np.iinfo(np.int32).max)
+            words = Vocabulary(self.n_centers, n_init=self.n_init, random_state=seed)
+            self.deviations_.append(weights)
+            self.vocabularies_.append(words.fit(nodes))
+        return self
+
+    def transform(self, X: Iterable[Any]) -> NDArray[np.float64]:
+        """Return the codes of the shapes `X`, ``(n_shapes, n_code)``, each of unit L2 norm."""
+        check_is_fitted(self)
+        centers = [words.cluster_centers_ for words in self.vocabularies_]
+        shapes = iterate_bands(X, self.n_maps_)
+        return np.stack([encode(bands, self.deviations_, centers, self.power) for bands in shapes])
+
+    @property
+    def _n_features_out(self) -> int:
+        """Length of a code, as the naming of the columns asks for it."""
+        return sum(words.cluster_centers_.size for words in self.vocabularies_)
+
+    def __sklearn_tags__(self) -> Any:
+        """Declare that the entries of the input may have any length, in two or three dimensions."""
+        tags = super().__sklearn_tags__()
+        tags.input_tags.three_d_array = True
+        return tags
+
+    def _check_parameters(self) -> None:
+        """Refuse parameters out of their range."""
+        if not 0 <= self.power <= 1:
+            msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"
+            raise ParameterError(msg)
+        for name in ("n_centers", "nodes_per_shape", "n_init"):
+            if getattr(self, name) < 1:
+                msg = f"{name}={getattr(self, name)} must be at least 1"
+                raise ParameterError(msg)
+
+
+def _length(values: NDArray[np.float64], axis: int | None = None) -> NDArray[np.float64]:
+    """Return L2 norms to divide by: one where the norm is zero."""
+    norm = np.linalg.norm(values, axis=axis, keepdims=True)
+    return np.where(norm > 0, norm, 1.0)
+
+
+def _draw(
+    shapes: Iterable[Bands], n_nodes: int, random: RandomState
+) -> tuple[list[list[NDArray[np.floating]]], ...]:
+    """Sample nodes of every shape, the same in all bands: for each band as given, and at unit rms."""
+    raw: list[list[NDArray[np.floating]]] = []
+    unit: list[list[NDArray[np.floating]]] = []
+    for bands in shapes:
+        raw, unit = raw or [[] for _ in bands], unit or [[] for _ in bands]
+        total = len(bands[0])
+        rows = np.arange(total) if total <= n_nodes else np.sort(random.permutation(total)[:n_nodes])
+        for band, maps in enumerate(bands):
+            raw[band].append(maps[rows])
+            unit[band].append(unit_rms(maps)[rows])
+    return raw, unit

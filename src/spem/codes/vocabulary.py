@@ -1,0 +1,180 @@
+"""The vocabulary: k-means centres of node features, and the residuals of nodes from them (5.1, 5.2)."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+from numba import njit
+from numpy.random import RandomState
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
+from sklearn.cluster import KMeans
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from spem.errors import ParameterError
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})  # type: ignore[untyped-decorator]
+def _nearest(features: NDArray[Any], columns: NDArray[Any], labels: NDArray[np.int32]) -> None:
+    """Write the index of each row's nearest centre; centres are columns, so that they are the lanes."""
+    n_features, n_centers = columns.shape
+    distance = np.empty(n_centers, columns.dtype)
+    for i in range(features.shape[0]):
+        distance[:] = 0
+        for j in range(n_features):
+            x = features[i, j]
+            for c in range(n_centers):
+                distance[c] += (x - columns[j, c]) * (x - columns[j, c])
+        best = 0
+        for c in range(1, n_centers):
+            if distance[c] < distance[best]:
+                best = c
+        labels[i] = best
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _accumulate(
+    features: NDArray[Any],
+    centers: NDArray[Any],
+    labels: NDArray[np.int32],
+    sums: NDArray[np.float64],
+) -> None:
+    """Add each row's difference from its centre to that centre's sum."""
+    for i in range(features.shape[0]):
+        c = labels[i]
+        for j in range(features.shape[1]):
+            sums[c, j] += np.float64(features[i, j]) - centers[c, j]
+
+
+def nearest_centers(features: NDArray[np.floating], centers: NDArray[np.floating]) -> NDArray[np.int32]:
+    """Assign each node to its nearest centre (5.1); of equally near ones the first.
+
+    Parameters
+    ----------
+    features
+        ``(n_nodes, n_features)``; distances are computed in its precision.
+    centers
+        ``(n_centers, n_features)``.
+
+    Returns
+    -------
+    NDArray
+        ``(n_nodes,)`` index of the centre.
+
+    Examples
+    --------
+    >>> nearest_centers(np.array([[0.1], [0.9]]), np.array([[0.0], [1.0]]))
+    array([0, 1], dtype=int32)
+    """
+    rows = np.ascontiguousarray(features)
+    labels = np.empty(len(rows), np.int32)
+    _nearest(rows, np.ascontiguousarray(centers.T, rows.dtype), labels)
+    return labels
+
+
+def residual_sums(features: NDArray[np.floating], centers: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Sum, for each centre, the differences of the nodes assigned to it from it (5.2).
+
+    Parameters
+    ----------
+    features
+        ``(n_nodes, n_features)`` node features of one shape.
+    centers
+        ``(n_centers, n_features)``.
+
+    Returns
+    -------
+    NDArray
+        ``(n_centers, n_features)`` sums in float64; zero for a centre without a node.
+
+    Examples
+    --------
+    >>> residual_sums(np.array([[0.0], [0.5], [2.0]]), np.array([[0.0], [1.5], [9.0]]))
+    array([[0.5],
+           [0.5],
+           [0. ]])
+    """
+    rows = np.ascontiguousarray(features)
+    sums = np.zeros(centers.shape)
+    _accumulate(rows, centers, nearest_centers(rows, centers), sums)
+    return sums
+
+
+class Vocabulary(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # type: ignore[misc]
+    """k-means centres of node features; transforms a node to its difference from the nearest one.
+
+    Parameters
+    ----------
+    n_centers
+        Number of centres ("words").
+    n_init
+        Number of k-means++ starts; the one of least inertia is kept.
+    max_iter
+        Most Lloyd iterations of one start.
+    random_state
+        Seed or generator of the starts.
+
+    Attributes
+    ----------
+    cluster_centers_
+        ``(n_centers, n_features)`` centres, in the precision of the training nodes.
+    inertia_
+        Sum of squared distances of the training nodes to their centres.
+    n_iter_
+        Number of Lloyd iterations of the best start.
+    n_features_in_
+        Number of features seen by `fit`.
+
+    Examples
+    --------
+    >>> nodes = np.array([[0.0], [0.2], [5.0], [5.2]])
+    >>> words = Vocabulary(n_centers=2, random_state=0).fit(nodes)
+    >>> np.abs(words.transform(nodes)).round(3).ravel()
+    array([0.1, 0.1, 0.1, 0.1])
+    """
+
+    def __init__(
+        self,
+        n_centers: int = 32,
+        *,
+        n_init: int = 1,
+        max_iter: int = 100,
+        random_state: int | RandomState | None = None,
+    ) -> None:
+        self.n_centers = n_centers
+        self.n_init = n_init
+        self.max_iter = max_iter
+        self.random_state = random_state
+
+    def fit(self, X: ArrayLike, y: Any = None) -> Self:
+        """Find the centres of the nodes ``X`` of shape ``(n_samples, n_features)``; `y` is ignored."""
+        nodes = validate_data(self, X, dtype=[np.float64, np.float32])
+        if len(nodes) < self.n_centers:
+            msg = (
+                f"n_samples={len(nodes)} training nodes are fewer than n_centers={self.n_centers}; "
+                "give more shapes or ask for fewer centres"
+            )
+            raise ParameterError(msg)
+        kmeans = KMeans(
+            self.n_centers, n_init=self.n_init, max_iter=self.max_iter, random_state=self.random_state
+        ).fit(nodes)
+        self.cluster_centers_ = kmeans.cluster_centers_
+        self.inertia_ = float(kmeans.inertia_)
+        self.n_iter_ = int(kmeans.n_iter_)
+        return self
+
+    def predict(self, X: ArrayLike) -> NDArray[np.int32]:
+        """Return the index of the centre nearest to each node (5.1), ``(n_samples,)``."""
+        return nearest_centers(self._nodes(X), self.cluster_centers_)
+
+    def transform(self, X: ArrayLike) -> NDArray[np.floating]:
+        """Return each node's difference from its nearest centre, ``(n_samples, n_features)``."""
+        nodes = self._nodes(X)
+        return np.asarray(nodes - self.cluster_centers_[nearest_centers(nodes, self.cluster_centers_)])
+
+    def _nodes(self, X: ArrayLike) -> NDArray[np.floating]:
+        """Check nodes against what was fitted."""
+        check_is_fitted(self)
+        dtype = self.cluster_centers_.dtype
+        return np.asarray(validate_data(self, X, dtype=dtype, reset=False))

@@ -1,0 +1,91 @@
+"""The model: fitting, coding, and its file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from spem.codes import settings as settings_module
+from spem.codes.container import write_container
+from spem.codes.model import Model
+from spem.codes.settings import Settings
+from spem.codes.vlad import VLAD
+from spem.errors import ModelError, ParameterError, ReadError
+
+SETTINGS = Settings(n_maps=3, n_centers=4, rho_ranges=((0.02, 0.2), (0.1, 0.5)))
+
+
+def shapes(seed=0):
+    """Return two bands of random maps of five shapes."""
+    rng = np.random.default_rng(seed)
+    return [tuple(rng.random((50, 3)).astype(np.float32) for _ in range(2)) for _ in range(5)]
+
+
+@pytest.fixture
+def model():
+    """Return a model of two bands."""
+    return Model.fit(SETTINGS, shapes())
+
+
+def test_model_codes_as_the_estimator_does(model):
+    """A model's codes are those of VLAD with the same parameters."""
+    expected = VLAD(4, random_state=0).fit(shapes()).transform(shapes(1))
+    np.testing.assert_allclose([model.encode(bands) for bands in shapes(1)], expected, atol=1e-6)
+    assert model.n_code == 24
+
+
+def test_saved_model_is_the_same_model(model, tmp_path):
+    """A loaded model has the digest of the saved one and gives bit-identical codes."""
+    model.save(tmp_path / "m.spem")
+    loaded = Model.load(tmp_path / "m.spem")
+    assert loaded.digest == model.digest
+    assert loaded.settings == model.settings
+    for bands in shapes(2):
+        np.testing.assert_array_equal(loaded.encode(bands), model.encode(bands))
+
+
+def test_digest_tells_settings_and_vocabularies_apart(model):
+    """Another setting or another collection gives another digest, the same ones the same."""
+    assert Model.fit(SETTINGS, shapes()).digest == model.digest
+    assert Model.fit(SETTINGS, shapes(3)).digest != model.digest
+    other = Settings(n_maps=3, n_centers=4, rho_ranges=SETTINGS.rho_ranges, voxels=99)
+    assert Model(other, model.deviations, model.centers).digest != model.digest
+    assert len(model.digest) == 12
+
+
+def test_maps_of_other_bands_are_refused(model):
+    """Maps that do not fit the model are named with the shape and the digest."""
+    with pytest.raises(ParameterError, match=rf"cat has \[3\] maps .* {model.digest} expects \[3, 3\]"):
+        model.encode(np.ones((5, 3)), "cat")
+
+
+def test_arrays_must_fit_the_settings(model):
+    """A model is refused whose arrays are not those of its settings."""
+    with pytest.raises(ModelError, match="2 bands, 4 centres and 3 maps got arrays"):
+        Model(SETTINGS, model.deviations[:1], model.centers)
+
+
+def test_model_of_a_later_method_is_refused(model, tmp_path, monkeypatch):
+    """A whole file with codes of a later format asks for an upgrade."""
+    later = {"settings": SETTINGS.to_json() | {"code_format": settings_module.CODE_FORMAT + 1}}
+    write_container(tmp_path / "m.spem", "model", later, model.to_arrays())
+    with pytest.raises(ModelError, match="upgrade spem"):
+        Model.load(tmp_path / "m.spem")
+
+
+def test_model_that_lacks_an_array_is_refused(model, tmp_path):
+    """A whole file without one of the vocabularies is refused."""
+    arrays = model.to_arrays()
+    arrays.pop("centers.1")
+    write_container(tmp_path / "m.spem", "model", {"settings": SETTINGS.to_json()}, arrays)
+    with pytest.raises(ModelError, match=r"lacks the array 'centers.1'"):
+        Model.load(tmp_path / "m.spem")
+
+
+def test_truncated_model_is_refused(model, tmp_path):
+    """Half a file is not a model."""
+    path = tmp_path / "m.spem"
+    model.save(path)
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(ReadError, match="truncated"):
+        Model.load(path)

@@ -1,0 +1,55 @@
+"""Intensities of projections."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spem.codes.normalise import relative_deviations, unit_rms
+from spem.errors import ParameterError
+
+
+def test_unit_rms_has_mean_square_one_and_keeps_zero_columns():
+    """Every column has mean square one, but for one of zeros."""
+    maps = np.random.default_rng(0).normal(3, 2, (500, 4))
+    maps[:, 2] = 0
+    assert np.mean(unit_rms(maps) ** 2, axis=0) == pytest.approx([1, 1, 0, 1], abs=1e-14)
+
+
+@given(st.floats(-300, 300), st.integers(1, 5))
+def test_unit_rms_ignores_scale_and_repetition(exponent, copies):
+    """Neither the unit of a projection nor finer sampling of the same values changes a node."""
+    maps = np.random.default_rng(1).normal(size=(20, 3))
+    scaled = np.tile(maps * 10.0**exponent, (copies, 1))
+    np.testing.assert_allclose(unit_rms(scaled)[:20], unit_rms(maps), rtol=1e-12)
+
+
+def test_unit_rms_leaves_its_argument_alone_and_keeps_float32():
+    """The caller's array is untouched, and single precision stays single."""
+    maps = np.full((4, 2), 5, np.float32)
+    maps.flags.writeable = False
+    assert unit_rms(maps).dtype == np.float32
+
+
+@given(st.floats(1e-6, 1e6), st.integers(1, 6))
+def test_deviations_ignore_unit_and_number_of_nodes(unit, copies):
+    """A common factor on all projections or more nodes of the same values change no weight."""
+    samples = [np.random.default_rng(seed).normal(size=(30, 3)) * [3, 2, 1] for seed in range(2)]
+    weights = relative_deviations(samples)
+    changed = relative_deviations([np.tile(unit * sample, (copies, 1)) for sample in samples])
+    np.testing.assert_allclose(changed, weights, rtol=1e-9)
+    assert np.linalg.norm(weights) == pytest.approx(1)
+
+
+def test_deviations_are_the_pooled_ones():
+    """Deviations are taken over the nodes of all shapes together, not shape by shape."""
+    samples = [np.array([[0.0, 0.0]] * 2), np.array([[3.0, 4.0]] * 2)]
+    np.testing.assert_allclose(relative_deviations(samples), [0.6, 0.8])
+
+
+def test_deviations_of_constant_maps_are_refused():
+    """Maps that nowhere vary cannot be weighted."""
+    with pytest.raises(ParameterError, match="no projection varies"):
+        relative_deviations([np.ones((5, 2))])

@@ -1,0 +1,144 @@
+"""VLAD: the formula, its invariants and the estimator."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sklearn.base import clone
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from spem.codes.vlad import VLAD, encode, vlad
+from spem.errors import ParameterError
+
+
+def collection(n_shapes: int = 4, n_bands: int = 1, seed: int = 0) -> list[Any]:
+    """Return random maps of shapes with different numbers of nodes."""
+    rng = np.random.default_rng(seed)
+    sizes = rng.integers(40, 80, n_shapes)
+    return [tuple(rng.random((n, 3)).astype(np.float32) for _ in range(n_bands)) for n in sizes]
+
+
+def test_vlad_by_hand():
+    """Two centres, three nodes: residual sums (3, 4) and nothing, power one half."""
+    nodes = np.array([[1.0, 1.0], [2.0, -3.0], [0.0, -2.0]])
+    centers = np.array([[0.0, 0.0], [50.0, 50.0]])
+    root = np.sqrt([3 / 5, 4 / 5])
+    expected = np.array([root[0], -root[1], 0, 0]) / np.linalg.norm(root)
+    np.testing.assert_allclose(vlad(nodes, centers, power=0.5), expected, rtol=1e-14)
+
+
+def test_vlad_of_nodes_on_their_centres_is_zero():
+    """Where all differences vanish the code is zero and nothing is divided by zero."""
+    centers = np.array([[0.0, 1.0], [2.0, 3.0]])
+    assert not vlad(centers, centers).any()
+
+
+@given(st.integers(0, 1000))
+def test_order_of_nodes_changes_no_code(seed):
+    """Permuting the nodes of a shape leaves its code unchanged."""
+    shapes = collection(n_bands=2)
+    learner = VLAD(5, random_state=0).fit(shapes)
+    order = np.random.default_rng(seed).permutation(len(shapes[0][0]))
+    permuted = tuple(maps[order] for maps in shapes[0])
+    np.testing.assert_allclose(learner.transform([permuted]), learner.transform(shapes[:1]), atol=1e-6)
+
+
+@given(st.integers(1, 4), st.floats(1e-3, 1e3))
+def test_voxel_budget_and_unit_change_no_code(copies, unit):
+    """More nodes with the same values, or maps in another unit, give the same code."""
+    shapes = [tuple(np.float64(maps) for maps in bands) for bands in collection()]
+    learner = VLAD(5, random_state=0).fit(shapes)
+    finer = [np.tile(unit * maps, (copies, 1)) for (maps,) in shapes]
+    np.testing.assert_allclose(learner.transform(finer), learner.transform(shapes), atol=1e-9)
+
+
+def test_codes_have_unit_length_and_equal_bands():
+    """A code has unit L2 norm, and each band the same share in it."""
+    learner = VLAD(5, random_state=0)
+    codes = learner.fit_transform(collection(n_bands=3)).reshape(4, 3, -1)
+    np.testing.assert_allclose((codes**2).sum(-1), 1 / 3, rtol=1e-12)
+
+
+def test_scale_false_weighs_all_projections_the_same():
+    """Without deviations every projection has weight one; with them, relative ones."""
+    shapes = [(np.float64(maps) * [9, 1, 1],) for (maps,) in collection()]
+    assert VLAD(3, scale=False, random_state=0).fit(shapes).deviations_[0].tolist() == [1, 1, 1]
+    weights = VLAD(3, random_state=0).fit(shapes).deviations_[0]
+    assert weights[0] / weights[1] == pytest.approx(9, rel=0.2)
+
+
+def test_one_band_may_come_as_an_array_and_shapes_as_a_generator():
+    """Arrays stand for tuples of one band, and the input is read once only."""
+    shapes = [maps for (maps,) in collection()]
+    learner = VLAD(3, random_state=0).fit(maps for maps in shapes)
+    codes = learner.transform((maps,) for maps in shapes)
+    np.testing.assert_array_equal(codes, learner.transform(shapes))
+
+
+def test_same_seed_same_codes_and_other_seed_others():
+    """Codes depend on the seed and on nothing else that is random."""
+    shapes = collection()
+    first, again, other = (
+        VLAD(5, nodes_per_shape=20, random_state=s).fit_transform(shapes) for s in (0, 0, 1)
+    )
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(first - other).max() > 0.01
+
+
+def test_codes_as_a_data_frame_with_named_columns():
+    """Pandas output has one named column for each entry of a code."""
+    learner = VLAD(2, random_state=0).set_output(transform="pandas")
+    frame = clone(learner).set_output(transform="pandas").fit_transform(collection())
+    assert list(frame.columns) == [f"vlad{i}" for i in range(6)]
+
+
+@pytest.mark.parametrize(
+    ("shapes", "message"),
+    [
+        ([], "got 0 shapes"),
+        ([np.ones((4, 2)), np.ones((4, 3))], r"shape 1 has \(3,\) maps in its bands, expected \(2,\)"),
+        ([(np.ones((4, 2)), np.ones((5, 2)))], r"bands of shape 0 have \[4, 5\] nodes"),
+        ([()], "at least one band"),
+        ([np.ones((0, 2))], "at least one of each"),
+        ([np.ones((4, 2)), np.full((4, 2), np.nan)], "maps of shape 1 contain NaN"),
+        ([np.ones((4, 2), complex)], "Complex data not supported"),
+        ([np.ones((4, 2, 2))], r"must be \(n_nodes, n_maps\)"),
+    ],
+)
+def test_bad_maps_are_refused(shapes, message):
+    """Each kind of unfit input is named with the shape it came from."""
+    with pytest.raises(ParameterError, match=message):
+        VLAD(2).fit(shapes)
+
+
+@pytest.mark.parametrize("bad", [{"power": 1.5}, {"n_centers": 0}, {"nodes_per_shape": 0}, {"n_init": 0}])
+def test_bad_parameters_are_refused(bad):
+    """Parameters out of their range are named."""
+    with pytest.raises(ParameterError, match=next(iter(bad))):
+        VLAD(**bad).fit(collection())
+
+
+def test_encode_wants_weights_and_centres_for_every_band():
+    """A missing band is an error and not a shorter code."""
+    with pytest.raises(ValueError, match="shorter"):
+        encode((np.ones((2, 1)), np.ones((2, 1))), (np.ones(1),), (np.ones((1, 1)),))
+
+
+# Rows of a two-dimensional array are shapes of one map, and a shape may have any number of nodes.
+ANY_LENGTH = "rows are shapes and their columns nodes: shapes may have any number of nodes"
+EXPECTED = {
+    "check_n_features_in_after_fitting": ANY_LENGTH,
+    "check_n_features_in": ANY_LENGTH,
+    "check_transformer_general": ANY_LENGTH,
+    "check_estimators_empty_data_messages": "a row without columns is a shape without nodes, refused as such",
+}
+
+
+@parametrize_with_checks([VLAD(n_centers=3)], expected_failed_checks=lambda estimator: EXPECTED)
+def test_scikit_learn_contract(estimator, check):
+    """VLAD keeps the contract of scikit-learn's estimators as far as it applies to lists of shapes."""
+    check(estimator)
