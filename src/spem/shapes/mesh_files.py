@@ -1,0 +1,80 @@
+"""Mesh files to vertices and triangles."""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from spem.errors import ReadError
+
+MESH_SUFFIXES = (".obj", ".off", ".ply", ".stl", ".glb")
+# The counts of an OFF file stand among its first words, behind comments at most.
+_HEADER_LINES = 100
+
+
+def load_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Read the vertices and triangles of a mesh file; the parts of a scene are put in their places.
+
+    Parameters
+    ----------
+    path
+        OBJ, OFF, PLY, STL or GLB.
+
+    Returns
+    -------
+    tuple of arrays
+        Vertices ``(n_vertices, 3)`` and faces ``(n_faces, 3)``; polygons are cut into triangles.
+
+    Raises
+    ------
+    ReadError
+        When the file is missing, empty, truncated, of another kind or has no faces. An OBJ file
+        that ends early cannot be told from a mesh with holes.
+
+    Examples
+    --------
+    >>> load_mesh(Path("absent.obj"))
+    Traceback (most recent call last):
+    ...
+    spem.errors.ReadError: absent.obj: no such file
+    """
+    if path.suffix.lower() not in MESH_SUFFIXES:
+        msg = f"{path}: expected a mesh as {', '.join(MESH_SUFFIXES)}, got {path.suffix or 'no suffix'}"
+        raise ReadError(msg)
+    if not path.is_file():
+        msg = f"{path}: no such file"
+        raise ReadError(msg)
+    if not path.stat().st_size:
+        msg = f"{path}: the file is empty; expected a mesh"
+        raise ReadError(msg)
+    try:
+        mesh = trimesh.load_scene(path, process=False, skip_materials=True).to_mesh()
+        vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+    except Exception as error:
+        # Readers of broken files fail in many ways: with ValueError, IndexError, struct.error, ...;
+        # an ImportError comes from one that looks for the character set of what is no text.
+        reason = "neither text nor whole" if isinstance(error, ImportError) else str(error)
+        reason = " ".join(reason.split())[:120] or type(error).__name__
+        msg = f"{path}: cannot be read as {path.suffix[1:].upper()} ({reason}); the file may be truncated"
+        raise ReadError(msg) from error
+    if not len(faces):
+        msg = f"{path}: no faces in it; expected a triangle or polygon mesh"
+        raise ReadError(msg)
+    if path.suffix.lower() == ".off":
+        _check_off_count(path, len(faces))
+    return vertices, faces
+
+
+def _check_off_count(path: Path, n_faces: int) -> None:
+    """Refuse an OFF file with fewer faces than its header announces."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        lines = (line.partition("#")[0] for line in file)
+        words = [word for line in islice(lines, _HEADER_LINES) for word in line.split()]
+    numbers = [int(word) for word in words if word.isdecimal()][:2]
+    if len(numbers) == 2 and n_faces < numbers[1]:
+        msg = f"{path}: {n_faces} of the {numbers[1]} faces of its header are there; the file is truncated"
+        raise ReadError(msg)
