@@ -1,0 +1,87 @@
+"""Neighbours of the nodes of a shape, and its boundary edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from spem.shapes.shape import FACE_FRACTION, Shape
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """The graph on which a field lives.
+
+    Parameters
+    ----------
+    neighbours
+        ``(n_nodes, 2 d)`` number of the neighbouring node in each direction (``2 * axis`` toward lower,
+        ``2 * axis + 1`` toward higher indices); ``n_nodes`` where the edge is a boundary edge.
+    fraction
+        ``(n_boundary_edges,)`` where the surface cuts each boundary edge, in (0, 1], in the order of
+        ``np.argwhere(neighbours == n_nodes)``.
+    """
+
+    neighbours: NDArray[np.int32]
+    fraction: NDArray[np.float64]
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return self.neighbours.shape[0]
+
+
+def surface_domain(shape: Shape) -> Domain:
+    """Domain whose boundary lies on the surface: each boundary edge is cut where `shape.cuts` says."""
+    return _domain(shape, use_cuts=True, default=FACE_FRACTION)
+
+
+def voxel_domain(shape: Shape) -> Domain:
+    """Domain of the paper: the boundary lies at the centres of the neighbouring outside voxels."""
+    return _domain(shape, use_cuts=False, default=1.0)
+
+
+def _domain(shape: Shape, *, use_cuts: bool, default: float) -> Domain:
+    n = shape.n_nodes
+    number = np.full(shape.mask.size, n, np.int32)
+    number[shape.voxels] = np.arange(n, dtype=np.int32)
+    strides = np.array([int(np.prod(shape.mask.shape[a + 1 :])) for a in range(shape.ndim)])
+    cuts = shape.cuts
+    keep = slice(None) if use_cuts else slice(0)
+    neighbours, fraction = _connect(
+        shape.voxels, number, strides, cuts.voxel[keep], cuts.direction[keep], cuts.fraction[keep], default
+    )
+    return Domain(neighbours, fraction)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _connect(voxels, number, strides, cut_voxel, cut_direction, cut_fraction, default):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Neighbour table and boundary fractions; nodes and cuts are both in ascending order of voxel."""
+    n, d = voxels.size, strides.size
+    neighbours = np.empty((n, 2 * d), np.int32)
+    fraction = np.empty(cut_voxel.size + 16, np.float64)
+    n_edges = 0
+    cut = 0
+    for i in range(n):
+        while cut < cut_voxel.size and cut_voxel[cut] < voxels[i]:
+            cut += 1
+        for k in range(2 * d):
+            step = strides[k // 2] if k % 2 else -strides[k // 2]
+            j = number[voxels[i] + step]
+            theta = default
+            if cut < cut_voxel.size and cut_voxel[cut] == voxels[i] and cut_direction[cut] == k:
+                theta = cut_fraction[cut]
+                cut += 1
+                j = n
+            neighbours[i, k] = j
+            if j == n:
+                if n_edges == fraction.size:
+                    grown = np.empty(2 * n_edges, np.float64)
+                    grown[:n_edges] = fraction
+                    fraction = grown
+                fraction[n_edges] = theta
+                n_edges += 1
+    return neighbours, fraction[:n_edges].copy()

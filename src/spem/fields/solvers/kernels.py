@@ -1,0 +1,192 @@
+"""Numba kernels of the block multigrid: each node carries one value per lane, each lane has its own shift.
+
+A level is a graph in C order with, per node, neighbours in 2d directions (a dummy row of zeros stands for a
+missing one), a Laplacian diagonal and a mass; lane l of node i has the diagonal ``diagonal[i] + shift[l] *
+mass[i]``. `weight` has one row for all nodes (finest level, `step` 0) or one row per node (`step` 1).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from spem.fields.solvers.lanes import LANES, add, div, load, mul, splat, store, sub, widen
+
+Lanes = NDArray[np.float32]
+Table = NDArray[np.int32]
+
+
+@njit(cache=True, nogil=True)
+def multiply(p: Lanes, q: Lanes, level: Any, shift: Lanes) -> NDArray[np.float64]:
+    """Write q = (A + shift) p and return the dot products of p and q, lane by lane."""
+    neighbours, weight, step, diagonal, mass = level
+    s = load(shift, 0)
+    total = np.zeros((1, LANES))
+    dot = load(total, 0)
+    for i in range(neighbours.shape[0]):
+        here = load(p, i)
+        value = mul(add(splat(diagonal[i]), mul(s, splat(mass[i * step]))), here)
+        for k in range(neighbours.shape[1]):
+            value = sub(value, mul(splat(weight[i * step, k]), load(p, neighbours[i, k])))
+        store(q, i, value)
+        dot = add(dot, mul(widen(here), widen(value)))
+    store(total, 0, dot)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def advance_and_relax(
+    x: Lanes, r: Lanes, p: Lanes, q: Lanes, z: Lanes, alpha: Lanes, level: Any, shift: Lanes
+) -> None:
+    """x += alpha p; r -= alpha q; then one forward Gauss-Seidel sweep for z from zero."""
+    neighbours, weight, step, diagonal, mass = level
+    s, a = load(shift, 0), load(alpha, 0)
+    for i in range(neighbours.shape[0]):
+        store(x, i, add(load(x, i), mul(a, load(p, i))))
+        value = sub(load(r, i), mul(a, load(q, i)))
+        store(r, i, value)
+        for k in range(0, neighbours.shape[1], 2):
+            value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
+        store(z, i, div(value, add(splat(diagonal[i]), mul(s, splat(mass[i * step])))))
+
+
+@njit(cache=True, nogil=True)
+def relax_forward(r: Lanes, z: Lanes, level: Any, shift: Lanes) -> None:
+    """One forward Gauss-Seidel sweep for z from zero: only lower neighbours have a value yet."""
+    neighbours, weight, step, diagonal, mass = level
+    s = load(shift, 0)
+    for i in range(neighbours.shape[0]):
+        value = load(r, i)
+        for k in range(0, neighbours.shape[1], 2):
+            value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
+        store(z, i, div(value, add(splat(diagonal[i]), mul(s, splat(mass[i * step])))))
+
+
+@njit(cache=True, nogil=True)
+def restrict(z: Lanes, coarse: Lanes, aggregate: Table, level: Any) -> None:
+    """Sum the residual over aggregates; after a forward sweep from zero it is the upper neighbours' part."""
+    neighbours, weight, step, _, _ = level
+    coarse[:] = 0
+    for i in range(neighbours.shape[0]):
+        value = load(coarse, aggregate[i])
+        for k in range(1, neighbours.shape[1], 2):
+            value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
+        store(coarse, aggregate[i], value)
+
+
+@njit(cache=True, nogil=True)
+def correct_and_relax(
+    r: Lanes, z: Lanes, coarse: Lanes, aggregate: Table, level: Any, shift: Lanes
+) -> NDArray[np.float64]:
+    """Add the coarse correction, sweep backward, and return the dot products of r and z, lane by lane."""
+    neighbours, weight, step, diagonal, mass = level
+    s = load(shift, 0)
+    total = np.zeros((1, LANES))
+    dot = load(total, 0)
+    n = neighbours.shape[0]
+    for i in range(n):
+        store(z, i, add(load(z, i), load(coarse, aggregate[i])))
+    for i in range(n - 1, -1, -1):
+        source = load(r, i)
+        value = source
+        for k in range(neighbours.shape[1]):
+            value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
+        value = div(value, add(splat(diagonal[i]), mul(s, splat(mass[i * step]))))
+        store(z, i, value)
+        dot = add(dot, mul(widen(source), widen(value)))
+    store(total, 0, dot)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def turn(z: Lanes, p: Lanes, beta: Lanes, n: int) -> None:
+    """p = z + beta p, the next search directions."""
+    b = load(beta, 0)
+    for i in range(n):
+        store(p, i, add(load(z, i), mul(b, load(p, i))))
+
+
+@njit(cache=True, nogil=True)
+def apply_dense(r: Lanes, z: Lanes, inverse: Lanes) -> None:
+    """z = inverse r on the coarsest level; row ``i * n + j`` of `inverse` holds entry (i, j) of all lanes."""
+    n = r.shape[0] - 1
+    for i in range(n):
+        value = mul(load(inverse, i * n), load(r, 0))
+        for j in range(1, n):
+            value = add(value, mul(load(inverse, i * n + j), load(r, j)))
+        store(z, i, value)
+
+
+@njit(cache=True, nogil=True)
+def peak(z: Lanes, n: int) -> NDArray[np.float64]:
+    """Largest magnitude in each lane."""
+    largest = np.zeros(LANES)
+    for i in range(n):
+        for lane in range(LANES):
+            largest[lane] = max(largest[lane], abs(z[i, lane]))
+    return largest
+
+
+@njit(cache=True, nogil=True)
+def coarsen(aggregate: Table, n_coarse: int, level: Any) -> Any:
+    """Galerkin graph of unsmoothed aggregation with the Laplacian halved.
+
+    Piecewise constant interpolation overestimates the stiffness by two per level, the mass not at all.
+    """
+    neighbours, weight, step, diagonal, mass = level
+    width = neighbours.shape[1]
+    table = np.full((n_coarse, width), n_coarse, np.int32)
+    weight_c = np.zeros((n_coarse, width), np.float32)
+    diagonal_c = np.zeros(n_coarse, np.float32)
+    mass_c = np.zeros(n_coarse, np.float32)
+    for i in range(neighbours.shape[0]):
+        here = aggregate[i]
+        diagonal_c[here] += np.float32(0.5) * diagonal[i]
+        mass_c[here] += mass[i * step]
+        for k in range(width):
+            j = neighbours[i, k]
+            if j == neighbours.shape[0]:
+                continue
+            half = np.float32(0.5) * weight[i * step, k]
+            if aggregate[j] == here:
+                diagonal_c[here] -= half
+            else:
+                table[here, k] = aggregate[j]
+                weight_c[here, k] += half
+    return table, weight_c, diagonal_c, mass_c
+
+
+@njit(cache=True, nogil=True)
+def aggregate_voxels(
+    voxels: NDArray[np.int64], shape: NDArray[np.int64], coarse_shape: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], Table]:
+    """Number the 2^d blocks that hold a node; return the block's flat coarse index, and each node's block."""
+    d = shape.size
+    size = 1
+    for a in range(d):
+        size *= coarse_shape[a]
+    number = np.full(size, -1, np.int32)
+    aggregate = np.empty(voxels.size, np.int32)
+    for i in range(voxels.size):
+        rest, flat, stride = voxels[i], 0, 1
+        for a in range(d - 1, -1, -1):
+            flat += (rest % shape[a]) // 2 * stride
+            rest //= shape[a]
+            stride *= coarse_shape[a]
+        number[flat] = 0
+        aggregate[i] = flat
+    n_coarse = 0
+    for flat in range(size):
+        if number[flat] == 0:
+            number[flat] = n_coarse
+            n_coarse += 1
+    blocks = np.empty(n_coarse, np.int64)
+    for flat in range(size):
+        if number[flat] >= 0:
+            blocks[number[flat]] = flat
+    for i in range(voxels.size):
+        aggregate[i] = number[aggregate[i]]
+    return blocks, aggregate

@@ -1,0 +1,129 @@
+"""Block multigrid on the nodes of a shape: the preconditioner of the sweep over ρ.
+
+Unsmoothed aggregation of 2^d blocks keeps the 2d+1-point structure on every level, so one set of kernels serves
+all levels and dimensions; one Gauss-Seidel sweep goes down and one, in reverse order, up, which makes the cycle
+symmetric.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.fields.operator import System
+from spem.fields.solvers import kernels
+from spem.fields.solvers.lanes import LANES
+
+# The coarsest level is inverted densely, lane by lane.
+COARSEST = 48
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """One graph of the hierarchy and the map to the next."""
+
+    graph: tuple[Any, ...]  # neighbours, weight, step, diagonal, mass: what the kernels take
+    aggregate: NDArray[np.int32] | None  # (n,) node of the next level, None on the coarsest
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes of the level."""
+        return int(self.graph[0].shape[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Hierarchy:
+    """Levels from fine to coarse, in units of the smallest spacing."""
+
+    levels: tuple[Level, ...]
+    unit: float  # the length that the finest weights are scaled by
+
+    @classmethod
+    def of(cls, system: System) -> Hierarchy:
+        """Coarsen a system until `COARSEST` nodes are left or no block merges any more."""
+        unit = min(system.shape.spacing)
+        graph: tuple[Any, ...] = (
+            system.domain.neighbours,
+            np.repeat(system.weights * unit**2, 2)[None].astype(np.float32),
+            0,
+            (system.diagonal * unit**2).astype(np.float32),
+            np.ones(1, np.float32),
+        )
+        voxels, shape = system.shape.voxels, np.array(system.shape.mask.shape)
+        levels = []
+        while graph[0].shape[0] > COARSEST:
+            coarse_shape = (shape + 1) // 2
+            blocks, aggregate = kernels.aggregate_voxels(voxels, shape, coarse_shape)
+            if blocks.size == voxels.size:
+                break
+            levels.append(Level(graph, aggregate))
+            table, weight, diagonal, mass = kernels.coarsen(aggregate, blocks.size, graph)
+            graph = (table, weight, 1, diagonal, mass)
+            voxels, shape = blocks, coarse_shape
+        levels.append(Level(graph, None))
+        return cls(tuple(levels), unit)
+
+
+class Cycle:
+    """One V-cycle for a block of shifts: an approximate inverse of A + shift, symmetric positive definite.
+
+    Parameters
+    ----------
+    hierarchy
+        Levels of the system.
+    shifts
+        ``(LANES,)`` shifts in units of the hierarchy.
+    z
+        ``(n_nodes + 1, LANES)`` array that takes the answers.
+    """
+
+    def __init__(self, hierarchy: Hierarchy, shifts: NDArray[np.float64], z: NDArray[np.float32]) -> None:
+        self.levels = hierarchy.levels
+        self.shift = shifts.astype(np.float32)[None]
+        self.r = [rows(level.n_nodes) for level in self.levels[1:]]
+        self.z = [z, *(rows(level.n_nodes) for level in self.levels[1:])]
+        self._inverse = _invert(self.levels[-1], shifts)
+
+    def finish(self, r: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Complete the cycle whose forward sweep on the finest level is done; return r·z by lane."""
+        if len(self.levels) == 1:
+            kernels.apply_dense(r, self.z[0], self._inverse)
+            return np.einsum("il,il->l", r, self.z[0], dtype=np.float64)[None]
+        return self._descend(0, r)
+
+    def apply(self, r: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Write the cycle's answer to r into ``self.z[0]`` and return r·z by lane."""
+        kernels.relax_forward(r, self.z[0], self.levels[0].graph, self.shift)
+        return self.finish(r)
+
+    def _descend(self, depth: int, r: NDArray[np.float32]) -> NDArray[np.float64]:
+        level, z, coarse_r, coarse_z = self.levels[depth], self.z[depth], self.r[depth], self.z[depth + 1]
+        kernels.restrict(z, coarse_r, level.aggregate, level.graph)
+        if depth + 2 == len(self.levels):
+            kernels.apply_dense(coarse_r, coarse_z, self._inverse)
+        else:
+            kernels.relax_forward(coarse_r, coarse_z, self.levels[depth + 1].graph, self.shift)
+            self._descend(depth + 1, coarse_r)
+        return kernels.correct_and_relax(r, z, coarse_z, level.aggregate, level.graph, self.shift)  # type: ignore[no-any-return]
+
+
+def rows(n: int) -> NDArray[np.float32]:
+    """Zeros for n nodes and the dummy row that missing neighbours point to."""
+    return np.zeros((n + 1, LANES), np.float32)
+
+
+def _invert(level: Level, shifts: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Dense inverses of the coarsest matrix, one per lane, laid out for `kernels.apply_dense`."""
+    neighbours, weight, step, diagonal, mass = level.graph
+    n = level.n_nodes
+    matrix = np.zeros((n, n + 1))
+    for k in range(neighbours.shape[1]):
+        matrix[np.arange(n), neighbours[:, k]] -= weight[step * np.arange(n), k]
+    matrix = matrix[:, :n]
+    stiffness = matrix + np.diag(diagonal.astype(np.float64))
+    masses = np.diag(np.broadcast_to(mass, n).astype(np.float64))
+    inverse = np.linalg.inv(stiffness + shifts[:, None, None] * masses)
+    return np.ascontiguousarray(inverse.transpose(1, 2, 0).reshape(n * n, LANES), np.float32)

@@ -1,0 +1,134 @@
+"""Galerkin reduced basis of the deficits u = 1 - v: all ρ from a few solves.
+
+Every u(s) solves (A + s) u = s·1, s = 1/ρ². In a basis B of solutions at a few s, the constant among them, the
+Galerkin solution y(s) of (K + s M) y = s c with K = BᵀAB, M = BᵀB, c = Bᵀ1 is the best approximation of
+u(s) in the energy norm, at the price of a small dense solve.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.fields.operator import System
+from spem.fields.solvers import reduced_kernels as kernels
+from spem.fields.solvers.lanes import LANES
+
+# Directions of a new block below this fraction of its largest are rounding noise of single precision.
+_DEPENDENT = 1e-13
+# Rows handled at a time, so that products stay in the cache.
+_CHUNK = 16_384
+
+Small = NDArray[np.float64]
+
+
+class ReducedBasis:
+    """Blocks of nearly orthonormal columns, the constant first, and the operator restricted to them.
+
+    Parameters
+    ----------
+    system
+        The system that the fields solve.
+    unit
+        Length that lengths are measured in, for scaling.
+    dtype
+        Precision that the columns are stored in.
+    """
+
+    def __init__(self, system: System, unit: float, dtype: type[np.floating[Any]]) -> None:
+        self.n_nodes = system.n_nodes
+        self.dtype = dtype
+        self.blocks: list[NDArray[Any]] = []
+        self.neighbours = system.domain.neighbours
+        self.weights = np.repeat(system.weights * unit**2, 2)
+        self.diagonal = system.diagonal * unit**2
+        self.mass = np.array([[float(self.n_nodes)]])
+        self.stiffness = np.array([[float(system.rhs.sum() * unit**2)]])
+
+    def solve(self, shifts: Small) -> Small:
+        """Coefficients ``(1 + LANES * n_blocks, n_shifts)`` of u in the constant and the columns."""
+        y = np.zeros((self.mass.shape[0], shifts.size))
+        used = np.diag(self.mass) > 0
+        stiffness, mass = self.stiffness[np.ix_(used, used)], self.mass[np.ix_(used, used)]
+        c = mass[0]
+        y[used] = np.stack([np.linalg.solve(stiffness + s * mass, s * c) for s in shifts], axis=1)
+        return y
+
+    def combine(self, y: Small, out: NDArray[Any]) -> None:
+        """Write the `LANES` vectors with coefficients `y` to the first n rows of `out`."""
+        if not self.blocks:
+            out[: self.n_nodes] = y[0]
+        for k, block in enumerate(self.blocks):
+            mix = np.ascontiguousarray(y[1 + k * LANES : 1 + (k + 1) * LANES])
+            kernels.combine(block, mix, np.ascontiguousarray(y[:1]), out, k > 0)
+
+    def residual(self, u: NDArray[np.float64], r: NDArray[np.float32], shifts: Small) -> None:
+        """Write s·1 - (A + s) u to r, computed in double precision."""
+        kernels.true_residual(u, r, self.neighbours, self.weights, self.diagonal, shifts[None])
+
+    def extend(self, vectors: NDArray[np.float32]) -> None:
+        """Orthonormalise a block of `LANES` vectors against the basis and append it."""
+        gram = kernels.cross(vectors, vectors)
+        inner = [gram[LANES:]] + [kernels.cross(block, vectors)[:LANES] for block in self.blocks]
+        inside = np.concatenate(inner)
+        scale = np.sqrt(np.diag(gram[:LANES]))
+        scale = np.divide(1.0, scale, out=np.zeros(LANES), where=scale > 0)
+        used = np.diag(self.mass) > 0
+        project = np.zeros_like(inside)
+        project[used] = np.linalg.solve(self.mass[np.ix_(used, used)], inside[used])
+        rest = (gram[:LANES] - inside.T @ project) * np.outer(scale, scale)
+        size, direction = np.linalg.eigh(rest)
+        keep = size > _DEPENDENT
+        mix = np.zeros((LANES, LANES))
+        mix[:, keep] = scale[:, None] * direction[:, keep] / np.sqrt(size[keep])
+        remove = -project @ mix
+        block = np.zeros((self.n_nodes + 1, LANES), self.dtype)
+        kernels.combine(vectors, mix, np.ascontiguousarray(remove[:1]), block, False)
+        for k, old in enumerate(self.blocks):
+            kernels.combine(old, np.ascontiguousarray(remove[1 + k * LANES :][:LANES]), remove[:1], block, True)
+        self._append(block)
+
+    def compress(self, shifts: Small, tolerance: float) -> tuple[NDArray[Any], Small, Small]:
+        """Rotate to the fewest columns that carry the deficits of `shifts`, orthogonal to the constant.
+
+        Returns the columns ``(n_nodes, rank)`` and the mass and stiffness of the constant and the columns. What is
+        dropped changes no deficit by more than `tolerance` in the root mean square.
+        """
+        used = np.flatnonzero(np.diag(self.mass) > 0)
+        upper = np.linalg.cholesky(self.mass[np.ix_(used, used)]).T
+        left, size, _ = np.linalg.svd((upper @ self.solve(shifts)[used])[1:], full_matrices=False)
+        rank = int(np.sum(size > tolerance * np.sqrt(self.n_nodes)))
+        rotation = np.eye(used.size)[:, : rank + 1]
+        rotation[1:, 1:] = left[:, :rank]
+        turn = np.zeros((self.mass.shape[0], rank + 1))
+        turn[used] = np.linalg.solve(upper, rotation)
+        turn[:, 0] = np.eye(self.mass.shape[0])[0]
+        columns = np.empty((self.n_nodes, rank), self.dtype)
+        for start in range(0, self.n_nodes, _CHUNK):
+            rows = slice(start, min(start + _CHUNK, self.n_nodes))
+            columns[rows] = turn[0, 1:]
+            for k, block in enumerate(self.blocks):
+                columns[rows] += block[rows] @ turn[1 + k * LANES :, 1:][:LANES].astype(self.dtype)
+        return columns, turn.T @ self.mass @ turn, turn.T @ self.stiffness @ turn
+
+    def _append(self, block: NDArray[Any]) -> None:
+        self.blocks.append(block)
+        self.mass = _border(self.mass, [kernels.cross(old, block) for old in self.blocks])
+        graph = self.neighbours, self.weights, self.diagonal
+        products = [kernels.cross_operator(old, block, *graph) for old in self.blocks]
+        self.stiffness = _border(self.stiffness, products)
+
+
+def _border(matrix: Small, products: list[Small]) -> Small:
+    """Append the rows and columns of a new block to a symmetric reduced matrix."""
+    columns = np.concatenate([products[-1][LANES:]] + [product[:LANES] for product in products])
+    old = matrix.shape[0]
+    grown = np.zeros((old + LANES, old + LANES))
+    grown[:old, :old] = matrix
+    grown[:, old:] = columns
+    grown[old:, :old] = columns[:old].T
+    corner = grown[old:, old:]
+    grown[old:, old:] = (corner + corner.T) / 2
+    return grown

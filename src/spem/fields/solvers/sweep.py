@@ -1,0 +1,195 @@
+"""All ρ for about the price of one: block multigrid conjugate gradients at a few poles, and a Galerkin basis.
+
+With the boundary eliminated every ρ has the same right-hand side, and the matrices differ by a multiple of the
+identity. The deficits u = 1 - v of all ρ lie, to any useful accuracy, in a space of some ten dimensions. So eight
+shifts are solved at once as the lanes of one array, in single precision; their span predicts all other ρ; the
+true residual of the prediction at eight further shifts, taken in double precision, measures its error and is what
+the next eight are solved for, until the error is below the tolerance everywhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.errors import ConvergenceError
+from spem.fields.hyperfield import Hyperfield
+from spem.fields.operator import System
+from spem.fields.solvers import kernels
+from spem.fields.solvers.lanes import LANES
+from spem.fields.solvers.multigrid import Cycle, Hierarchy, rows
+from spem.fields.solvers.protocol import Solution
+from spem.fields.solvers.reduced import ReducedBasis
+
+# Poles of the first block, as fractions of the logarithmic range of the shifts: Chebyshev nodes stretched to the
+# largest shift, where the fields vary fastest (worst error over hands, combs and balls; see benchmarks/poles.py).
+_LOWEST_POLE = 0.06
+# A block is solved to this fraction of the tolerance, or of its own start: single precision reaches no further.
+_MARGIN, _SINGLE_LIMIT = 0.2, 1e-6
+# Basis columns kept in single precision err by about 1e-7 of the field.
+_SINGLE_STORAGE = 3e-7
+# Basis directions that contribute less than this fraction of the tolerance are dropped at the end.
+_DROPPED = 1e-2
+
+Small = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The fast sweep over ρ.
+
+    Parameters
+    ----------
+    rtol
+        Largest error of any field at any node, relative to the field's maximum (1, on the boundary).
+    max_blocks
+        Limit on the blocks of eight poles.
+    max_iterations
+        Limit on the iterations for each block.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from spem.fields.operator import assemble
+    >>> from spem.shapes.shape import Shape
+    >>> system = assemble(Shape.from_mask(np.ones(3)), "voxel")
+    >>> Sweep(rtol=1e-12).solve(system, np.array([1.0, np.inf])).values.round(3)
+    array([[0.429, 1.   ],
+           [0.286, 1.   ],
+           [0.429, 1.   ]])
+    """
+
+    rtol: float = 1e-6
+    max_blocks: int = 12
+    max_iterations: int = 100
+
+    def solve(self, system: System, rho: NDArray[np.float64]) -> Solution:
+        """Solve for each ρ; the residual is the largest entry of the preconditioned true residual."""
+        try:
+            field, residual, spent, converged = self._run(system, rho)
+        except np.linalg.LinAlgError as error:  # pragma: no cover - a system that is not an M-matrix
+            raise ConvergenceError(str(error)) from error
+        advice = f"raise rtol={self.rtol:g}, or solve directly"
+        return Solution(field.fields(), np.full(rho.size, residual), converged, spent, advice)
+
+    def hyperfield(self, system: System, rho: NDArray[np.float64]) -> Hyperfield:
+        """Low-rank hyperfield over the range of `rho`; raises `ConvergenceError` if it misses `rtol`."""
+        field, residual, spent, converged = self._run(system, rho)
+        if not converged:
+            advice = f"raise rtol={self.rtol:g}, or solve directly"
+            Solution(field.at(rho[:1]), np.array([residual]), False, spent, advice).checked(system.shape.name)
+        return field
+
+    def _run(self, system: System, rho: NDArray[np.float64]) -> tuple[Hyperfield, float, int, bool]:
+        hierarchy = Hierarchy.of(system)
+        dtype = np.float32 if self.rtol > _SINGLE_STORAGE else np.float64
+        basis = ReducedBasis(system, hierarchy.unit, dtype)
+        targets = np.square(hierarchy.unit / rho[np.isfinite(rho)])
+        block = _Block(hierarchy, basis, self)
+        poles: list[float] = []
+        worst, converged = 0.0, targets.size == 0
+        candidates = _candidates(targets)
+        while not converged and len(poles) < self.max_blocks * LANES:
+            shifts = _first_poles(targets) if not poles else _next_poles(np.array(poles), candidates)
+            worst = block.measure(shifts)
+            converged = bool(poles) and worst <= self.rtol / 2
+            if not converged:
+                basis.extend(block.solve())
+                poles.extend(shifts)
+        if not converged and poles:
+            worst = block.measure(_next_poles(np.array(poles), candidates))
+            converged = worst <= self.rtol / 2
+        iterations = block.iterations
+        del block
+        return _hyperfield(system, rho, basis, candidates, self.rtol, worst), worst, iterations, converged
+
+
+class _Block:
+    """Work space for `LANES` shifts: measures what the basis predicts for them, then solves for what it misses."""
+
+    def __init__(self, hierarchy: Hierarchy, basis: ReducedBasis, options: Sweep) -> None:
+        n = basis.n_nodes
+        self.hierarchy, self.basis, self.options = hierarchy, basis, options
+        self.x, self.r, self.z = rows(n), rows(n), rows(n)
+        # The prediction and the search directions are never needed at the same time.
+        self.u = np.zeros((n + 1, LANES))
+        self.p, self.q = (half.reshape(n + 1, LANES) for half in self.u.reshape(-1).view(np.float32).reshape(2, -1))
+        self.iterations = 0
+
+    def measure(self, shifts: Small) -> float:
+        """Estimate the largest error of the basis at these shifts, from its preconditioned true residual."""
+        self.u[-1] = 0
+        self.basis.combine(self.basis.solve(shifts), self.u)
+        self.basis.residual(self.u, self.r, shifts)
+        self.cycle = Cycle(self.hierarchy, shifts, self.z)
+        self.product = self.cycle.apply(self.r)
+        self.error = kernels.peak(self.z, self.basis.n_nodes)
+        return float(self.error.max())
+
+    def solve(self) -> NDArray[np.float32]:
+        """Solve (A + s) x = r, lane by lane, for the residual that was measured."""
+        x, r, z, p, q = self.x, self.r, self.z, self.p, self.q
+        graph, shift = self.hierarchy.levels[0].graph, self.cycle.shift
+        x[:] = 0
+        p[:] = z
+        start = rz = self.product
+        goal = np.maximum(_MARGIN * self.options.rtol, _SINGLE_LIMIT * self.error)
+        for _ in range(self.options.max_iterations):
+            alpha = _ratio(rz, kernels.multiply(p, q, graph, shift))
+            kernels.advance_and_relax(x, r, p, q, z, alpha, graph, shift)
+            new = self.cycle.finish(r)
+            self.iterations += 1
+            if np.all(np.sqrt(new[0]) * self.error <= goal * np.sqrt(start[0])):
+                break
+            kernels.turn(z, p, _ratio(new, rz), self.basis.n_nodes)
+            rz = new
+        return x
+
+
+def _hyperfield(
+    system: System, rho: NDArray[np.float64], basis: ReducedBasis, shifts: Small, rtol: float, error: float
+) -> Hyperfield:
+    """Compress the basis for the range of shifts and put the operator back in the unit of the spacing."""
+    columns, mass, stiffness = basis.compress(shifts, _DROPPED * rtol)
+    stiffness /= min(system.shape.spacing) ** 2
+    return Hyperfield(system.shape, rho, columns, mass, stiffness, system.boundary, error)
+
+
+def _ratio(numerator: Small, denominator: Small) -> NDArray[np.float32]:
+    """Quotient by lane, zero for a lane that has nothing left to solve."""
+    quotient = np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > 0)
+    return quotient.astype(np.float32)
+
+
+def _first_poles(targets: Small) -> Small:
+    """Eight shifts that span the range well; the targets themselves when they are no more than eight."""
+    distinct = np.unique(targets)
+    if distinct.size <= LANES:
+        return np.pad(distinct, (0, LANES - distinct.size), mode="edge")
+    t = np.cos((2 * np.arange(LANES) + 1) / (2 * LANES) * np.pi)
+    t = _LOWEST_POLE + (1 - _LOWEST_POLE) * (t / t[0] + 1) / 2
+    return np.asarray(distinct[0] * (distinct[-1] / distinct[0]) ** t)
+
+
+def _candidates(targets: Small) -> Small:
+    """Shifts at which the error is to be small: the targets if few, else a dense logarithmic grid."""
+    distinct = np.unique(targets)
+    if distinct.size <= LANES:
+        return distinct
+    return np.geomspace(distinct[0], distinct[-1], 25 * LANES)
+
+
+def _next_poles(poles: Small, candidates: Small) -> Small:
+    """Eight more shifts, each where ∏|s - p|/(s + p), the decay of the rational interpolant, is largest (Leja)."""
+    if candidates.size <= LANES:
+        return np.pad(candidates, (0, LANES - candidates.size), mode="edge")
+    chosen = list(poles)
+    tiny = np.finfo(float).tiny
+    decay = sum(np.log(np.abs(candidates - p) / (candidates + p) + tiny) for p in chosen)
+    for _ in range(LANES):
+        pole = candidates[int(np.argmax(decay))]
+        decay = decay + np.log(np.abs(candidates - pole) / (candidates + pole) + tiny)
+        chosen.append(pole)
+    return np.array(chosen[-LANES:])
