@@ -1,0 +1,261 @@
+"""Volume files decoded to an array with its spacing: NumPy, TIFF stacks, NIfTI."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.errors import ParameterError, ReadError, SpemError
+from spem.shapes.limits import check_file, check_size
+
+TIFF_SUFFIXES = (".tif", ".tiff")
+# Arrays of an .npz in the order in which they are looked for.
+_ARRAYS = ("mask", "volume", "labels")
+_UNIT_AXES = "CTS"
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """The array of a volume and where it lies.
+
+    Parameters
+    ----------
+    array
+        ``(n_0, ..., n_{d-1})`` values at the voxel centres.
+    spacing
+        ``(d,)`` distance between voxel centres.
+    origin
+        ``(d,)`` coordinates of the centre of ``array[0, ..., 0]``.
+    name
+        Short name.
+    source
+        The file or call.
+    affine
+        ``(d + 1, d + 1)`` map from index to world coordinates, or None.
+    notes
+        What a report should say of the reading.
+    """
+
+    array: NDArray[Any]
+    spacing: tuple[float, ...]
+    origin: tuple[float, ...]
+    name: str
+    source: str
+    affine: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
+
+    def with_spacing(self, spacing: float | tuple[float, ...] | None, name: str) -> Stack:
+        """Return the stack with another spacing, unless it is None.
+
+        Raises
+        ------
+        ParameterError
+            When it is not one positive number for all or each axis.
+        """
+        d = self.array.ndim
+        if spacing is None:
+            return self
+        steps = (
+            tuple(np.broadcast_to(np.asarray(spacing, float), (d,)).tolist())
+            if np.ndim(spacing) == 0
+            else (
+                tuple(float(h) for h in spacing)  # type: ignore[union-attr]
+            )
+        )
+        if len(steps) != d or not all(0 < h < np.inf for h in steps):
+            msg = f"{name}: spacing={spacing}: expected one positive number, or {d} for the {d} axes"
+            raise ParameterError(msg)
+        return replace(self, spacing=steps)
+
+
+def read_stack(path: Path, bytes_per_voxel: float, memory_limit: int | None) -> Stack:
+    """Decode a volume file, after its header has been checked against the memory limit.
+
+    Parameters
+    ----------
+    path
+        A file with suffix .npy, .npz, .tif, .tiff, .nii or .nii.gz.
+    bytes_per_voxel
+        Most bytes that will be held for one voxel.
+    memory_limit
+        Bytes; None for SPEM_MEMORY_LIMIT or 2 GiB.
+
+    Raises
+    ------
+    ReadError
+        When the file is missing, empty, damaged or of another kind.
+    SizeError
+        When the header asks for more memory than the limit.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.savez(Path(folder, "box.npz"), mask=np.ones((2, 2)), spacing=[0.5, 2])
+    ...     read_stack(Path(folder, "box.npz"), 8, None).spacing
+    (0.5, 2.0)
+    """
+    check_file(path)
+    decoder = _decoder(path)
+
+    def check(shape: tuple[int, ...]) -> None:
+        check_size(shape, bytes_per_voxel, memory_limit, str(path))
+
+    try:
+        stack = decoder(path, check)
+    except SpemError:
+        raise
+    except MemoryError:
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        msg = f"{path}: damaged, truncated or not a {path.suffix} file ({reason}); write it again"
+        raise ReadError(msg) from error
+    if stack.array.ndim == 0 or stack.array.size == 0 or stack.array.dtype.kind not in "biuf":
+        msg = f"{path}: expected an array of numbers, got {stack.array.dtype} of shape {stack.array.shape}"
+        raise ReadError(msg)
+    return stack
+
+
+def tiff_pages(path: Path) -> int:
+    """Return the number of pages of a TIFF, 1 when it cannot be told; more than one are a volume."""
+    import tifffile
+
+    try:
+        with tifffile.TiffFile(path) as tiff:
+            series = tiff.series[0]
+            return int(np.prod([n for n, a in zip(series.shape, series.axes, strict=True) if a not in "YXS"]))
+    except Exception:  # noqa: BLE001 the image reader then says what is wrong with the file
+        return 1
+
+
+_Check = Callable[[tuple[int, ...]], None]
+
+
+def _decoder(path: Path) -> Callable[[Path, _Check], Stack]:
+    """Return the function that decodes files of this kind."""
+    name = path.name.lower()
+    decoders = {
+        ".npy": _npy,
+        ".npz": _npz,
+        ".nii": _nifti,
+        ".nii.gz": _nifti,
+        **dict.fromkeys(TIFF_SUFFIXES, _tiff),
+    }
+    for suffix, decoder in decoders.items():
+        if name.endswith(suffix):
+            return decoder
+    msg = f"{path}: not a volume file; expected one of {', '.join(decoders)}"
+    raise ReadError(msg)
+
+
+def _npy(path: Path, check: _Check) -> Stack:
+    """Decode a NumPy array; mapped first, so that its header alone is read."""
+    check(np.load(path, mmap_mode="r", allow_pickle=False).shape)
+    array = np.load(path, allow_pickle=False)
+    return Stack(array, (1.0,) * array.ndim, (0.0,) * array.ndim, path.stem, str(path))
+
+
+def _npz(path: Path, check: _Check) -> Stack:
+    """Decode the volume of an archive of arrays, with its spacing and origin."""
+    with np.load(path, allow_pickle=False) as archive:
+        names = [n for n in archive.files if n not in ("spacing", "origin")]
+        if not names:
+            msg = f"{path}: no volume among the arrays {archive.files}; expected one of {', '.join(_ARRAYS)}"
+            raise ReadError(msg)
+        chosen = next((n for n in _ARRAYS if n in names), names[0])
+        check(_npz_shape(path, chosen))
+        array = archive[chosen]
+        d = array.ndim
+        spacing = archive["spacing"] if "spacing" in archive.files else np.ones(d)
+        origin = archive["origin"] if "origin" in archive.files else np.zeros(d)
+        note = () if len(names) == 1 else (f"array {chosen!r} of {len(names)}",)
+    stack = Stack(array, (1.0,) * d, _per_axis(origin, d, path, "origin"), path.stem, str(path), notes=note)
+    return stack.with_spacing(_per_axis(spacing, d, path, "spacing"), str(path))
+
+
+def _npz_shape(path: Path, name: str) -> tuple[int, ...]:
+    """Return the shape of an array in an archive from its header alone."""
+    with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as member:
+        version = np.lib.format.read_magic(member)
+        read = (
+            np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        )
+        return tuple(read(member)[0])
+
+
+def _per_axis(values: NDArray[Any], d: int, path: Path, what: str) -> tuple[float, ...]:
+    """Return one number per axis out of a stored scalar or array."""
+    if np.size(values) not in (1, d):
+        msg = f"{path}: its {what} has {np.size(values)} numbers, the volume {d} axes"
+        raise ReadError(msg)
+    return tuple(float(v) for v in np.broadcast_to(np.ravel(values), (d,)))
+
+
+def _nifti(path: Path, check: _Check) -> Stack:
+    """Decode NIfTI: spacing from the zooms of the header, the affine kept beside it."""
+    import nibabel
+
+    image = nibabel.load(path)
+    shape = tuple(image.shape)
+    d = len(shape)
+    while d > 1 and shape[d - 1] == 1:
+        d -= 1
+    check(shape)
+    zooms = tuple(float(z) for z in image.header.get_zooms()[:d])
+    array = np.asanyarray(image.dataobj).reshape(shape[:d])
+    name = path.name[: path.name.lower().index(".nii")]
+    affine = np.asarray(image.affine, np.float64) if d <= 3 else None
+    known = all(0 < z < np.inf for z in zooms)
+    note = "spacing from the header" if known else "no spacing in the header, 1 taken"
+    return Stack(array, zooms if known else (1.0,) * d, (0.0,) * d, name, str(path), affine, (note,))
+
+
+def _tiff(path: Path, check: _Check) -> Stack:
+    """Decode a TIFF stack: the first series, its axes in file order."""
+    import tifffile
+
+    with tifffile.TiffFile(path) as tiff:
+        series = tiff.series[0]
+        shape = tuple(int(n) for n in series.shape)
+        check(shape)
+        axes = "".join(a for a, n in zip(series.axes, shape, strict=True) if n > 1)
+        many = [a for a in axes if a in _UNIT_AXES]
+        if many:
+            msg = f"{path}: axes {axes} hold several channels or times; expected one, write it alone"
+            raise ReadError(msg)
+        spacing, note = _tiff_spacing(tiff, axes)
+        array = series.asarray().reshape([n for n in shape if n > 1])
+    return Stack(array, spacing, (0.0,) * array.ndim, path.stem, str(path), notes=(note,))
+
+
+def _tiff_spacing(tiff: Any, axes: str) -> tuple[tuple[float, ...], str]:
+    """Return the spacing along each axis, from OME or ImageJ metadata where all of it is there."""
+    found: dict[str, float] = {}
+    source = ""
+    if tiff.is_ome:
+        import tifffile
+
+        source = "OME"
+        images = tifffile.xml2dict(tiff.ome_metadata)["OME"]["Image"]
+        pixels = (images[0] if isinstance(images, list) else images)["Pixels"]
+        units = {pixels.get(f"PhysicalSize{a}Unit", "µm") for a in axes}
+        if len(units) == 1:
+            found = {a: float(pixels[f"PhysicalSize{a}"]) for a in axes if f"PhysicalSize{a}" in pixels}
+    elif tiff.is_imagej:
+        source = "ImageJ"
+        tags = tiff.pages[0].tags
+        found = {"Z": float(tiff.imagej_metadata.get("spacing", 0))}
+        for axis, tag in (("X", "XResolution"), ("Y", "YResolution")):
+            count, length = tags[tag].value if tag in tags else (0, 1)
+            found[axis] = length / count if count else 0.0
+    spacing = tuple(found.get(a, 0.0) for a in axes)
+    if spacing and all(0 < h < np.inf for h in spacing):
+        return spacing, f"spacing from the {source} metadata"
+    return (1.0,) * len(axes), "no spacing in the file, 1 taken"
