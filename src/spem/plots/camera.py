@@ -60,8 +60,8 @@ class Camera:
         Examples
         --------
         >>> camera = Camera.fit([[0.0, 0, 0], [1, 1, 1]], (0, 0), (100, 100))
-        >>> camera.rotation.round(3).tolist()
-        [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]
+        >>> camera.rotation[2].tolist(), camera.scale
+        ([1.0, 0.0, 0.0], 94.0)
         """
         rotation = view_rotation(view)
         turned = np.asarray(points, np.float64) @ rotation[:2].T
@@ -116,6 +116,18 @@ def view_rotation(view: View) -> NDArray[np.float64]:
         [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
     )
     return np.stack([right, np.cross(toward, right), toward])
+
+
+def view_aspect(points: ArrayLike, view: View) -> float:
+    """Return the height of a set of points over their width, as seen in a view.
+
+    Examples
+    --------
+    >>> round(view_aspect([[0.0, 0, 0], [1, 2, 1]], (0, 0)), 3)
+    0.5
+    """
+    width, height = np.ptp(np.asarray(points, np.float64) @ view_rotation(view)[:2].T, axis=0)
+    return float(height / max(width, 1e-300))
 
 
 def principal_view(points: ArrayLike) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from spem.errors import ParameterError
-from spem.plots.camera import principal_view, view_rotation
+from spem.plots.camera import principal_view, view_aspect, view_rotation
 from spem.plots.fields import draw_line, draw_outline, draw_slice, draw_values
 from spem.plots.raster import render_surface
 from spem.plots.style import FIELD_CMAP, MAP_CMAP, MUTED, TEXT_SIZE, bare, panels
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from spem.plots.camera import View
     from spem.shapes.shape import Shape
 
-PANEL_PIXELS = (420, 420)
+PANEL_PIXELS = 420
 
 
 def figure_fields(
@@ -76,7 +76,7 @@ def figure_fields(
     fields = node_columns(shape, values)
     n_fields = fields.shape[1]
     captions = _titles(titles, n_fields)
-    figure, axes = panels(n_fields, columns=columns)
+    figure, axes = panels(n_fields, columns=columns, aspect=_aspect(shape, view))
     limits = [(0.0, 1.0)] * n_fields
     _fill(shape, fields, axes, limits, symmetric=False, contours=contours, view=view)
     _caption(shape, axes, captions)
@@ -111,12 +111,12 @@ def figure_maps(
     >>> from types import SimpleNamespace
     >>> from spem.shapes.shape import Shape
     >>> shape = Shape.from_mask(np.ones((3, 3)))
-    >>> maps = SimpleNamespace(shape=shape, values=np.ones((9, 2)), explained=np.array([0.99, 0.01]))
+    >>> maps = SimpleNamespace(shape=shape, values=np.ones((9, 2)), explained=np.array([0.97, 0.03]))
     >>> figure_maps(maps).axes[0].get_title()
-    'P₁  99 %'
+    'P₁  97 %'
     """
     values = node_columns(maps.shape, maps.values)[:, :n_maps]
-    figure, axes = panels(values.shape[1], columns=columns)
+    figure, axes = panels(values.shape[1], columns=columns, aspect=_aspect(maps.shape, view))
     limits = [value_limits(column, symmetric=True) for column in values.T]
     _fill(maps.shape, values, axes, limits, symmetric=True, contours=False, view=view)
     titles = [f"{map_name(j)}  {_percent(maps.explained[j])}" for j in range(values.shape[1])]
@@ -149,9 +149,13 @@ def figure_slices(shape: Shape, values: ArrayLike, *, symmetric: bool = False) -
     >>> len(figure_slices(Shape.from_mask(np.ones((3, 3, 3))), np.ones(27)).axes)
     3
     """
-    figure, axes = panels(3, width=2.2, height=2.2)
+    reach = max(n * h for n, h in zip(shape.mask.shape, shape.spacing, strict=True)) / 2
+    figure, axes = panels(3, width=2.2)
     for axis, ax in enumerate(axes):
         draw_slice(shape, values, ax, axis=axis, symmetric=symmetric)
+        # All three on one scale: equal squares about the middle of each slice.
+        x, y = np.mean(ax.get_xlim()), np.mean(ax.get_ylim())
+        ax.set(xlim=(x - reach, x + reach), ylim=(y + reach, y - reach))
         down, right = (a for a in range(3) if a != axis)
         bare(ax, f"axis {down} ↓  axis {right} →")
     return figure
@@ -203,18 +207,31 @@ def _fill_surfaces(
     """Draw each column on one surface, cut open across the axis that faces the viewer most."""
     rotation = principal_view(shape.points) if view is None else view_rotation(view)
     surface = shape_surface(shape, int(np.abs(rotation[2]).argmax()), toward=rotation[2])
+    size = (PANEL_PIXELS, max(1, round(PANEL_PIXELS * _aspect(shape, rotation))))
     for ax, column, ends in zip(axes, values.T, limits, strict=True):
         picture = render_surface(
             surface.vertices,
             surface.faces,
             surface_values(shape, surface, column),
             view=rotation,
-            size=PANEL_PIXELS,
+            size=size,
             cmap=cmap,
             limits=ends,
         )
         ax.imshow(picture, interpolation="antialiased")
         bare(ax)
+
+
+def _aspect(shape: Shape, view: View | None) -> float:
+    """Height over width of the picture of a shape, between one fifth and two."""
+    if shape.ndim == 1:
+        return 0.6
+    if shape.ndim == 2:
+        down, right = (n * h for n, h in zip(shape.mask.shape, shape.spacing, strict=True))
+        return float(np.clip(down / right, 0.2, 2.0))
+    points = shape.points
+    seen = view_aspect(points, principal_view(points) if view is None else view)
+    return float(np.clip(seen, 0.2, 2.0))
 
 
 def _titles(titles: Sequence[str] | None, n_panels: int) -> list[str]:
@@ -237,19 +254,24 @@ def _caption(shape: Shape, axes: list[Axes], titles: list[str]) -> None:
 
 
 def _percent(fraction: float) -> str:
-    """Write a fraction as a percentage with as many digits as it takes to tell it from 0 and 100."""
+    """Write a fraction as a percentage with two digits, and as many nines as it has."""
     percent = 100 * float(fraction)
-    if 99.5 <= percent < 100 or percent < 1:
-        return f"{percent:.2g} %" if percent < 1 else f"{min(percent, 99.99):.2f} %"
-    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.1f} %"
+    if percent < 0.01:
+        return "< 0.01 %"
+    if percent > 99:
+        return f"{min(percent, 99.99):.2f} %" if fraction < 1 else "100 %"
+    return f"{percent:.2g} %"
 
 
 def _colour_bar(
     figure: Figure, axes: list[Axes], cmap: str, limits: tuple[float, float], words: list[str]
 ) -> None:
     """Draw one slim scale for all panels."""
+    rows = axes[0].get_subplotspec().get_gridspec().nrows  # type: ignore[union-attr]
     scale = ScalarMappable(Normalize(*limits), cmap)
-    bar = figure.colorbar(scale, ax=axes, fraction=0.03, pad=0.015, aspect=28, shrink=0.8)
+    bar = figure.colorbar(
+        scale, ax=axes, fraction=0.03, pad=0.015, aspect=20, shrink=0.85 / rows, anchor=(0.0, 1.0)
+    )
     bar.set_ticks(list(np.linspace(*limits, 3)), labels=words)
     bar.ax.tick_params(length=0, labelsize=TEXT_SIZE, labelcolor=MUTED)
     bar.outline.set_visible(False)

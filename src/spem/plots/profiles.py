@@ -11,7 +11,7 @@ from spem.plots.camera import Camera, principal_view
 from spem.plots.fields import draw_outline
 from spem.plots.figures import map_name
 from spem.plots.raster import render_surface
-from spem.plots.style import COLOURS, DASHES, INK, MARKERS, MUTED, TEXT_SIZE, bare, framed
+from spem.plots.style import COLOURS, DASHES, INK, MARKERS, MUTED, TEXT_SIZE, bare, framed, length_axis
 from spem.plots.surfaces import shape_surface
 from spem.plots.values import require_drawable
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from spem.shapes.shape import Shape
 
 PICTURE_PIXELS = (480, 480)
-# Steps of ρ over more than this ratio are shown on a logarithmic axis.
+# A range of ρ over more than this ratio is shown on a logarithmic axis.
 LOGARITHMIC_RATIO = 20.0
 
 
@@ -127,7 +127,7 @@ def draw_variance(maps: Maps, ax: Axes) -> BarContainer:
 def _curves(
     rho: NDArray[np.float64], values: NDArray[np.float64], ax: Axes, names: list[str] | None = None
 ) -> list[Line2D]:
-    """Draw columns of values over ρ, told apart by colour, dash and a marker at the end."""
+    """Draw columns of values over ρ, told apart by colour, dash and a marker."""
     lines = [
         ax.plot(
             rho,
@@ -135,7 +135,8 @@ def _curves(
             color=COLOURS[j % len(COLOURS)],
             linestyle=DASHES[j // len(COLOURS) % len(DASHES)],
             marker=MARKERS[j % len(MARKERS)],
-            markevery=[len(rho) - 1],
+            # One marker a curve, each elsewhere: curves meet at the ends.
+            markevery=[(2 * j + 1) * len(rho) // (2 * values.shape[1])],
             markersize=4.5,
             linewidth=1.4,
             label=names[j] if names else "_",
@@ -143,7 +144,7 @@ def _curves(
         for j, column in enumerate(values.T)
     ]
     if rho.size and rho.max() > LOGARITHMIC_RATIO * rho.min():
-        ax.set_xscale("log")
+        length_axis(ax)
     return lines
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from PIL import Image
 
 from spem.errors import ParameterError
@@ -50,9 +51,9 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def panels(
-    n_panels: int, *, columns: int = 5, width: float = 1.9, height: float = 1.9
+    n_panels: int, *, columns: int = 5, width: float = 1.9, aspect: float = 1.0
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure with a grid of `n_panels` axes, as many in a row as `columns`.
+    """Return a figure with a grid of `n_panels` axes, at most `columns` in a row, in even rows.
 
     Parameters
     ----------
@@ -60,8 +61,10 @@ def panels(
         Number of axes wanted, at least one.
     columns
         Most axes in a row.
-    width, height
-        Size of one panel, in inches.
+    width
+        Width of one panel, in inches.
+    aspect
+        Height of the pictures over their width; extreme ones are bounded.
 
     Raises
     ------
@@ -77,8 +80,9 @@ def panels(
     if n_panels < 1:
         msg = "nothing to draw: at least one panel is needed"
         raise ParameterError(msg)
-    across = min(n_panels, columns)
-    down = ceil(n_panels / across)
+    down = ceil(n_panels / columns)
+    across = ceil(n_panels / down)
+    height = width * min(max(aspect, 0.3), 1.6) + 0.25  # the title
     figure = new_figure(across * width, down * height)
     return figure, [figure.add_subplot(down, across, i + 1) for i in range(n_panels)]
 
@@ -114,6 +118,22 @@ def framed(ax: Axes, xlabel: str, ylabel: str) -> None:
     ax.spines[["left", "bottom"]].set_color(MUTED)
     ax.grid(visible=True, color="#e3e6ea", linewidth=0.6)
     ax.set_axisbelow(True)
+
+
+def length_axis(ax: Axes) -> None:
+    """Make the horizontal axis logarithmic, with ticks written as plain numbers.
+
+    Examples
+    --------
+    >>> ax = new_figure(2, 2).add_subplot()
+    >>> length_axis(ax)
+    >>> ax.get_xscale()
+    'log'
+    """
+    ax.set_xscale("log")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda length, _: f"{length:g}"))
 
 
 def figure_png(figure: Figure, dpi: float = 150) -> bytes:

@@ -206,8 +206,7 @@ def draw_surface(
 
     Examples
     --------
-    >>> from spem.plots.values import node_values, value_limits
-    from spem.plots.style import new_figure
+    >>> from spem.plots.style import new_figure
     >>> from spem.shapes.shape import Shape
     >>> ax = new_figure(2, 2).add_subplot()
     >>> draw_surface(Shape.from_mask(np.ones((3, 3, 3))), None, ax).get_array().shape

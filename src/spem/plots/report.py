@@ -1,0 +1,158 @@
+"""A collection on one page: a single HTML file that needs nothing else and no network."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from hashlib import sha256
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from spem.errors import LabelError, ParameterError
+from spem.plots.markup import text
+from spem.plots.report_gallery import Gallery, shapes_section
+from spem.plots.report_queries import queries_section
+from spem.plots.report_sections import (
+    classes_section,
+    failures_section,
+    maps_section,
+    scores_section,
+    settings_section,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable, Mapping, Sequence
+    from os import PathLike
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from spem.search.evaluation import PrecisionRecall, Scores
+
+
+def write_report(
+    path: str | PathLike[str],
+    *,
+    title: str,
+    names: Sequence[str],
+    thumbnails: Sequence[bytes | NDArray[np.uint8] | None],
+    labels: Sequence[Hashable] | None = None,
+    map_pictures: Sequence[bytes | None] = (),
+    scores: Scores | None = None,
+    curve: PrecisionRecall | None = None,
+    distances: ArrayLike | None = None,
+    settings: Mapping[str, object] | None = None,
+    failures: Sequence[tuple[object, str]] = (),
+) -> Path:
+    """Write a report on a collection as one self-contained HTML file.
+
+    Parameters
+    ----------
+    path
+        File to write; an existing one is replaced.
+    title
+        Heading of the page.
+    names
+        ``(n,)`` name of each shape.
+    thumbnails
+        ``(n,)`` picture of each shape: a PNG file, an ``(h, w, 4)`` array of bytes, or None.
+    labels
+        ``(n,)`` class of each shape, where known; without it there are no scores and no queries.
+    map_pictures
+        Up to `n` PNG files, of the first shapes in order; None where there is none.
+    scores, curve
+        What `spem.search` makes of the distances and labels.
+    distances
+        ``(n, n)`` distances between shapes, for the queries answered worst and best.
+    settings
+        What the codes were made with, by name.
+    failures
+        Files that were left out, each with the reason.
+
+    Returns
+    -------
+    path
+        The file written.
+
+    Raises
+    ------
+    ParameterError
+        If pictures, names and distances do not match in number.
+    LabelError
+        If there is not one label for each shape.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page = write_report(f"{folder}/a.html", title="Letters", names=["a"], thumbnails=[None])
+    ...     page.read_text(encoding="utf-8").count("<h1>Letters</h1>")
+    1
+    """
+    matrix = None if distances is None else np.asarray(distances, np.float64)
+    _check(names, thumbnails, labels, map_pictures, matrix)
+    words = None if labels is None else [str(label) for label in labels]
+    gallery = Gallery(names, words, thumbnails)
+    body = [
+        scores_section(scores, curve),
+        queries_section(gallery, matrix),
+        classes_section(scores, words),
+        maps_section(gallery, map_pictures),
+        shapes_section(gallery),
+        settings_section(settings or {}),
+        failures_section(failures),
+        gallery.symbols(),
+    ]
+    target = Path(path)
+    # A file name that is not UTF-8 reaches here with surrogates, which no encoding takes.
+    target.write_bytes(_page(title, _summary(words, len(names)), "".join(body)).encode("utf-8", "replace"))
+    return target
+
+
+def _check(
+    names: Sequence[str],
+    thumbnails: Sequence[object],
+    labels: Sequence[Hashable] | None,
+    map_pictures: Sequence[object],
+    distances: NDArray[np.float64] | None,
+) -> None:
+    """Raise unless everything is of the same number of shapes."""
+    n = len(names)
+    if len(thumbnails) != n or len(map_pictures) > n:
+        msg = f"{n} names need {n} thumbnails and at most as many map pictures, not {len(thumbnails)} and "
+        msg += f"{len(map_pictures)}; None stands for a missing one"
+        raise ParameterError(msg)
+    if distances is not None and distances.shape != (n, n):
+        msg = f"distances between {n} shapes are ({n}, {n}), not {distances.shape}"
+        raise ParameterError(msg)
+    if labels is not None and len(labels) != n:
+        msg = f"{n} shapes need {n} labels, not {len(labels)}"
+        raise LabelError(msg)
+
+
+def _summary(labels: Sequence[str] | None, n_shapes: int) -> str:
+    """How many shapes, and of how many classes."""
+    shapes = f"{n_shapes} shape{'' if n_shapes == 1 else 's'}"
+    if labels is None:
+        return shapes
+    n_classes = len(set(labels))
+    return f"{shapes} in {n_classes} class{'' if n_classes == 1 else 'es'}"
+
+
+def _page(title: str, summary: str, body: str) -> str:
+    """Put a body into the page; the browser is told to run no script but ours and to fetch nothing."""
+    parts = files("spem.plots")
+    style = parts.joinpath("report.css").read_text(encoding="utf-8")
+    script = parts.joinpath("report.js").read_text(encoding="utf-8")
+    digest = b64encode(sha256(script.encode("utf-8")).digest()).decode("ascii")
+    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta name="color-scheme" content="light dark">\n<title>{text(title)}</title>\n'
+        f"<style>\n{style}</style>\n</head>\n<body>\n<header>\n<h1>{text(title)}</h1>\n"
+        f"<p>{summary}</p>\n</header>\n"
+        f"<main>\n{body}</main>\n<script>{script}</script>\n</body>\n</html>\n"
+    )
