@@ -1,1 +1,47 @@
-"""Screened Poisson hyperfields for shape coding."""
+"""Screened Poisson hyperfields for shape coding: shapes in; fields, SPEM maps, codes and ranked answers out."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+# Public name -> module that defines it; each is imported when it is first used.
+_HOME = {
+    "ConvergenceError": "spem.errors",
+    "Cuts": "spem.shapes.shape",
+    "Hyperfield": "spem.fields.hyperfield",
+    "LabelError": "spem.errors",
+    "Maps": "spem.embedding.maps",
+    "ModelError": "spem.errors",
+    "ParameterError": "spem.errors",
+    "ReadError": "spem.errors",
+    "Report": "spem.shapes.shape",
+    "Shape": "spem.shapes.shape",
+    "ShapeError": "spem.errors",
+    "SizeError": "spem.errors",
+    "SpemError": "spem.errors",
+    "field": "spem.api",
+    "maps": "spem.api",
+    "read": "spem.shapes.read",
+    "read_all": "spem.shapes.read",
+    "sweep": "spem.api",
+    "synthetic": "spem.shapes.synthetic",
+}
+
+__all__ = sorted(_HOME)  # noqa: PLE0605
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        msg = f"module 'spem' has no attribute {name!r}"
+        raise AttributeError(msg)
+    module = importlib.import_module(_HOME[name])
+    value = module if name == "synthetic" else getattr(module, name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

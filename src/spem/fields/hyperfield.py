@@ -112,10 +112,10 @@ class Hyperfield:
         if not grid:
             coords |= {f"x{a}": ("node", column) for a, column in enumerate(shape.points.T)}
             return xarray.DataArray(values, coords, ("node", "rho"), shape.name, attributes)
-        axes = tuple(f"axis_{a}" for a in range(shape.ndim))
-        for a, name in enumerate(axes):
-            coords[name] = shape.origin[a] + shape.spacing[a] * np.arange(shape.mask.shape[a])
-        return xarray.DataArray(shape.to_grid(values), coords, (*axes, "rho"), shape.name, attributes)
+        axes = {f"axis_{a}": values for a, values in enumerate(shape.axes)}
+        return xarray.DataArray(
+            shape.to_grid(values), axes | coords, (*axes, "rho"), shape.name, attributes
+        )
 
     def save(self, path: str | Path) -> None:
         """Write the hyperfield to a zarr group, in its low-rank form (see `spem.fields.storage`)."""

@@ -224,6 +224,12 @@ class Shape:
         index = np.stack(np.unravel_index(self.voxels, self.mask.shape), axis=1)
         return np.asarray(self.origin) + index * np.asarray(self.spacing)
 
+    @property
+    def axes(self) -> tuple[NDArray[np.float64], ...]:
+        """Coordinates of the grid along each axis."""
+        counts = self.mask.shape
+        return tuple(o + h * np.arange(n) for o, h, n in zip(self.origin, self.spacing, counts, strict=True))
+
     def to_grid(self, values: ArrayLike, fill: float = np.nan) -> NDArray[np.float64]:
         """Scatter node values ``(n_nodes, ...)`` to the grid; `fill` stands outside the shape."""
         nodal = np.asarray(values)

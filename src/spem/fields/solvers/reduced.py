@@ -18,8 +18,6 @@ from spem.fields.solvers.lanes import LANES
 
 # Directions of a new block below this fraction of its largest are rounding noise of single precision.
 _DEPENDENT = 1e-13
-# Rows handled at a time, so that products stay in the cache.
-_CHUNK = 16_384
 
 Small = NDArray[np.float64]
 
@@ -106,11 +104,13 @@ class ReducedBasis:
         turn[used] = np.linalg.solve(upper, rotation)
         turn[:, 0] = np.eye(self.mass.shape[0])[0]
         columns = np.empty((self.n_nodes, rank), self.dtype)
-        for start in range(0, self.n_nodes, _CHUNK):
-            rows = slice(start, min(start + _CHUNK, self.n_nodes))
-            columns[rows] = turn[0, 1:]
-            for k, block in enumerate(self.blocks):
-                columns[rows] += block[rows] @ turn[1 + k * LANES :, 1:][:LANES].astype(self.dtype)
+        out = np.zeros((self.n_nodes + 1, LANES), self.dtype)
+        for start in range(0, rank, LANES):
+            width = min(LANES, rank - start)
+            y = np.zeros((turn.shape[0], LANES))
+            y[:, :width] = turn[:, 1 + start : 1 + start + width]
+            self.combine(y, out)
+            columns[:, start : start + width] = out[:-1, :width]
         return columns, turn.T @ self.mass @ turn, turn.T @ self.stiffness @ turn
 
     def _append(self, block: NDArray[Any]) -> None:

@@ -1,0 +1,121 @@
+"""The facade: one short call for each step, over the objects of the stages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spem.embedding.maps import Maps, compute_maps
+from spem.fields.hyperfield import Hyperfield
+from spem.fields.operator import Boundary, assemble
+from spem.fields.rho import DEFAULT_COUNT, Scheme, check_rho, sample_rho
+from spem.fields.solvers.protocol import Solver
+from spem.fields.solvers.sweep import Sweep
+from spem.shapes.shape import Shape
+
+# A few fields asked for by name are worth more digits than a sweep that feeds maps.
+_FIELD_RTOL = 1e-10
+
+
+def field(
+    shape: Shape,
+    rho: ArrayLike,
+    *,
+    boundary: Boundary = "surface",
+    solver: Solver | None = None,
+) -> NDArray[np.floating[Any]]:
+    """Solve Δv − v/ρ² = 0 with v = 1 on the boundary (1.1).
+
+    Parameters
+    ----------
+    shape
+        Any shape.
+    rho
+        One ρ or several, in the unit of the spacing; `inf` is allowed.
+    boundary
+        ``"surface"`` (second order) or ``"voxel"`` (the paper's).
+    solver
+        Any solver of `spem.fields.solvers`; the fast sweep to 1e-10 by default.
+
+    Returns
+    -------
+    ``(n_nodes,)`` for one ρ, ``(n_nodes, n_rho)`` for several; rows in the order of ``shape.points``.
+
+    Raises
+    ------
+    ParameterError
+        If a ρ is not positive.
+    ConvergenceError
+        If the solver misses its tolerance; it carries the best iterate.
+
+    Examples
+    --------
+    >>> import spem
+    >>> v = spem.field(spem.synthetic.interval(length=9.0, spacing=0.1), rho=2.0)
+    >>> print(round(float(v.min()), 3))  # 1 / cosh(4.5 / 2)
+    0.209
+    """
+    values = check_rho(rho)
+    chosen = Sweep(rtol=_FIELD_RTOL) if solver is None else solver
+    solution = chosen.solve(assemble(shape, boundary), values).checked(shape.name)
+    return solution.values[:, 0] if np.ndim(rho) == 0 else solution.values
+
+
+def sweep(
+    shape: Shape,
+    rho: ArrayLike | None = None,
+    *,
+    n_rho: int = DEFAULT_COUNT,
+    scheme: Scheme = "linear",
+    boundary: Boundary = "surface",
+    rtol: float = 1e-6,
+) -> Hyperfield:
+    """Solve for all ρ of a range at once, as a low-rank hyperfield.
+
+    Parameters
+    ----------
+    shape
+        Any shape.
+    rho
+        The ρ to sample, in the unit of the spacing; by default `n_rho` of them in a range set by the shape's size.
+    n_rho, scheme
+        Number and spacing of the default samples (``"linear"``, ``"squared"``, ``"log"``).
+    boundary
+        ``"surface"`` (second order) or ``"voxel"`` (the paper's).
+    rtol
+        Largest error of any field at any node, relative to the field's maximum.
+
+    Examples
+    --------
+    >>> import spem
+    >>> spem.sweep(spem.synthetic.disk(radius=20.0)).rho.size
+    64
+    """
+    samples = sample_rho(shape.size, count=n_rho, scheme=scheme) if rho is None else check_rho(rho)
+    return Sweep(rtol=rtol).hyperfield(assemble(shape, boundary), samples)
+
+
+def maps(source: Shape | Hyperfield, n_maps: int = 6, *, centred: bool = False, **options: Any) -> Maps:
+    """SPEM maps of a shape or of its hyperfield: P = YΦ (4.4).
+
+    Parameters
+    ----------
+    source
+        A shape, swept with `options` first, or a hyperfield.
+    n_maps
+        Number of maps.
+    centred
+        Remove the mean field first.
+    **options
+        Passed to `sweep` when `source` is a shape.
+
+    Examples
+    --------
+    >>> import spem
+    >>> spem.maps(spem.synthetic.disk(radius=20.0), n_maps=4).basis.shape
+    (64, 4)
+    """
+    hyperfield = source if isinstance(source, Hyperfield) else sweep(source, **options)
+    return compute_maps(hyperfield, n_maps, centred=centred)

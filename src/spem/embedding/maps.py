@@ -1,0 +1,133 @@
+"""SPEM maps (4.4): the principal components of a hyperfield over ρ, projected to the nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.errors import ParameterError
+from spem.fields.hyperfield import Hyperfield
+from spem.shapes.shape import Shape
+
+if TYPE_CHECKING:
+    import xarray
+
+# A last entry below this fraction of the largest cannot carry the sign: rounding or a small change of the shape
+# could flip it.
+_SMALL_LAST = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Maps:
+    """SPEM maps of one shape.
+
+    Parameters
+    ----------
+    shape
+        The shape; its nodes carry the maps.
+    values
+        ``(n_nodes, n_maps)`` projections P = YΦ, strongest first.
+    basis
+        ``(n_rho, n_maps)`` orthonormal columns Φ.
+    variance
+        ``(n_maps,)`` mean square of each map over the nodes (about the mean field if centred).
+    rho
+        ``(n_rho,)`` the sampled ρ.
+    total_variance
+        Sum of the variances of all components.
+    centred
+        Whether the mean field was removed.
+    """
+
+    shape: Shape
+    values: NDArray[np.floating[Any]]
+    basis: NDArray[np.float64]
+    variance: NDArray[np.float64]
+    rho: NDArray[np.float64]
+    total_variance: float
+    centred: bool = False
+
+    @property
+    def explained(self) -> NDArray[np.float64]:
+        """``(n_maps,)`` fraction of the total variance that each map explains."""
+        return self.variance / self.total_variance
+
+    def to_xarray(self, *, grid: bool = False) -> xarray.DataArray:
+        """Label the maps: dims ``(node, map)``, or one dim per axis of the grid and ``map``."""
+        import xarray
+
+        shape, coords = self.shape, {"map": np.arange(1, self.values.shape[1] + 1)}
+        attributes = {"spacing": shape.spacing, "centred": int(self.centred)}
+        if not grid:
+            points: dict[str, Any] = {f"x{a}": ("node", column) for a, column in enumerate(shape.points.T)}
+            return xarray.DataArray(self.values, coords | points, ("node", "map"), shape.name, attributes)
+        axes = {f"axis_{a}": values for a, values in enumerate(shape.axes)}
+        return xarray.DataArray(
+            shape.to_grid(self.values), axes | coords, (*axes, "map"), shape.name, attributes
+        )
+
+    def __repr__(self) -> str:
+        shares = ", ".join(f"{share:.2g}" for share in self.explained)
+        return f"Maps({self.shape.name!r}, {self.values.shape[1]} maps on {self.shape.n_nodes} nodes, explained {shares})"
+
+
+def compute_maps(field: Hyperfield, n_maps: int = 6, *, centred: bool = False) -> Maps:
+    """Project a hyperfield on its principal components over ρ.
+
+    With Y the ``(n_nodes, n_rho)`` matrix of fields, Φ holds the leading eigenvectors of YᵀY and the maps are
+    P = YΦ (4.4). Y is never formed: its singular value decomposition is that of a small matrix, the coefficients
+    in an orthonormal basis, so components are right down to rounding of the strongest one.
+
+    Parameters
+    ----------
+    field
+        The hyperfield of one shape.
+    n_maps
+        Number of maps, at most the number of sampled ρ.
+    centred
+        Remove the mean field over the nodes first. The paper's retrieval figures need it not removed.
+
+    Examples
+    --------
+    >>> import spem
+    >>> result = compute_maps(spem.sweep(spem.synthetic.disk(radius=12.0)), n_maps=3)
+    >>> result.values.shape == (result.shape.n_nodes, 3)
+    True
+    >>> bool((result.basis[-1] > 0).all())
+    True
+    """
+    if not 1 <= n_maps <= field.rho.size:
+        msg = f"n_maps={n_maps}: expected 1 to {field.rho.size}, the number of sampled rho"
+        raise ParameterError(msg)
+    upper = np.linalg.cholesky(field.mass).T
+    small = upper @ field.coefficients()
+    if centred:
+        small[0] = 0.0  # the other columns are orthogonal to the constant
+    left, size, right = np.linalg.svd(small, full_matrices=False)
+    size = np.pad(size, (0, max(0, n_maps - size.size)))
+    left, basis = _complete(left, n_maps), _complete(right.T, n_maps)
+    sign = _signs(basis)
+    mix = np.linalg.solve(upper, left * (size[:n_maps] * sign))
+    values = field.basis @ mix[1:].astype(field.basis.dtype) + mix[0].astype(field.basis.dtype)
+    variance, total = np.square(size) / field.shape.n_nodes, np.square(size).sum() / field.shape.n_nodes
+    return Maps(field.shape, values, basis * sign, variance[:n_maps], field.rho, float(total), centred)
+
+
+def _signs(basis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sign that makes the last entry of each column positive, or the largest where the last is negligible."""
+    largest = np.take_along_axis(basis, np.abs(basis).argmax(axis=0)[None], axis=0)[0]
+    leading = np.where(np.abs(basis[-1]) > _SMALL_LAST * np.abs(largest), basis[-1], largest)
+    return np.where(leading < 0, -1.0, 1.0)
+
+
+def _complete(columns: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """First `count` columns, with orthonormal ones appended when there are fewer (their maps are zero)."""
+    if columns.shape[1] >= count:
+        return columns[:, :count]
+    full, _ = np.linalg.qr(np.hstack([columns, np.eye(columns.shape[0])]))
+    if full.shape[1] >= count:
+        return np.hstack([columns, full[:, columns.shape[1] : count]])
+    return np.pad(columns, ((0, 0), (0, count - columns.shape[1])))
