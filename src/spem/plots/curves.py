@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-    from spem.search.evaluation import PrecisionRecall
+    from spem.retrieval.evaluation import PrecisionRecall
 
 
 def draw_precision_recall(curves: PrecisionRecall | Mapping[str, PrecisionRecall], ax: Axes) -> list[Line2D]:

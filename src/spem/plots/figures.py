@@ -12,7 +12,7 @@ from spem.errors import ParameterError
 from spem.plots.camera import principal_view, view_aspect, view_rotation
 from spem.plots.fields import draw_line, draw_outline, draw_slice, draw_values
 from spem.plots.raster import render_surface
-from spem.plots.style import FIELD_CMAP, MAP_CMAP, MUTED, TEXT_SIZE, bare, panels
+from spem.plots.style import FIELD_CMAP, MAP_CMAP, MUTED, TEXT_SIZE, bare, figure_png, panels
 from spem.plots.surfaces import shape_surface, surface_values
 from spem.plots.values import node_columns, value_limits
 
@@ -124,6 +124,20 @@ def figure_maps(
     if maps.shape.ndim > 1:
         _colour_bar(figure, axes, MAP_CMAP, (-1.0, 1.0), ["−", "0", "+"])
     return figure
+
+
+def map_picture(maps: Maps, n_maps: int = 4) -> bytes:
+    r"""Return a row of the leading maps as a small PNG file, as reports show it.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from spem.shapes.shape import Shape
+    >>> shape = Shape.from_mask(np.ones((3, 3)))
+    >>> map_picture(SimpleNamespace(shape=shape, values=np.ones((9, 1)), explained=np.ones(1)))[:4]
+    b'\x89PNG'
+    """
+    return figure_png(figure_maps(maps, n_maps=n_maps, columns=n_maps), dpi=90)
 
 
 def figure_slices(shape: Shape, values: ArrayLike, *, symmetric: bool = False) -> Figure:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from spem.search.evaluation import PrecisionRecall, Scores
+    from spem.retrieval.evaluation import PrecisionRecall, Scores
 
 
 def write_report(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from spem.search.evaluation import PrecisionRecall
+    from spem.retrieval.evaluation import PrecisionRecall
 
 WIDTH, HEIGHT = 360.0, 270.0
 LEFT, TOP, RIGHT, BOTTOM = 44.0, 10.0, 12.0, 40.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
 N_QUERIES = 6
 N_ANSWERS = 8
+QUERIES_OF_A_CLASS = 2
 
 
 def queries_section(gallery: Gallery, distances: NDArray[np.float64] | None) -> str:
@@ -32,8 +34,10 @@ def queries_section(gallery: Gallery, distances: NDArray[np.float64] | None) -> 
     if not order:
         return ""
     n_each = min(N_QUERIES, max(1, len(order) // 2))
-    worst = [_query(gallery, distances, labels, i, quality[i]) for i in order[:n_each]]
-    best = [_query(gallery, distances, labels, i, quality[i]) for i in order[::-1][:n_each]]
+    worst, best = (
+        [_query(gallery, distances, labels, i, quality[i]) for i in _varied(ranked, labels)[:n_each]]
+        for ranked in (order, order[::-1])
+    )
     legend = (
         '<p class="note">✓ same class as the query, ✗ another class. Ordered by average precision, the'
         " mean of the precision at each shape of the query's class.</p>"
@@ -73,6 +77,17 @@ def average_precisions(distances: NDArray[np.float64], labels: NDArray[np.str_])
         if right.size:
             precision[i] = np.mean(np.arange(1, right.size + 1) / (right + 1))
     return precision
+
+
+def _varied(ranked: list[int], labels: NDArray[np.str_]) -> list[int]:
+    """Keep the first few queries of each class, so that one class does not fill the list."""
+    taken: Counter[str] = Counter()
+    kept = []
+    for i in ranked:
+        taken[str(labels[i])] += 1
+        if taken[str(labels[i])] <= QUERIES_OF_A_CLASS:
+            kept.append(i)
+    return kept
 
 
 def _query(

@@ -12,7 +12,7 @@ from spem.plots.report_gallery import Gallery
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from spem.search.evaluation import PrecisionRecall, Scores
+    from spem.retrieval.evaluation import PrecisionRecall, Scores
 
 MEASURES = {
     "NN": "nearest neighbour",

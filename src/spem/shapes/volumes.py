@@ -220,14 +220,11 @@ def _grey(stack: Stack, level: float, how: str, name: str) -> Shape:
     if not level < high:
         msg = f"{name}: level={level:g} leaves no voxel inside: the values run {low:g} to {high:g}"
         raise ShapeError(msg)
-    kind = (
-        np.float64
-        if array.dtype.itemsize > 4 or (array.dtype.kind in "iu" and array.itemsize > 2)
-        else np.float32
-    )
+    # single precision keeps every 16-bit grey level apart
+    wide = array.dtype.itemsize > (4 if array.dtype.kind == "f" else 2)
     report = _report(stack, f"grey volume over {level:.4g} ({how})")
     return level_shape(
-        array.astype(kind) - kind(level),
+        np.subtract(array, level, dtype=np.float64 if wide else np.float32),
         stack.spacing,
         origin=stack.origin,
         name=name,
@@ -267,9 +264,9 @@ def _kind(array: NDArray[Any]) -> tuple[Literal["mask", "labels", "grey"], NDArr
     return "labels", values
 
 
-def _countable(array: NDArray[Any], high: np.generic) -> bool:
+def _countable(array: NDArray[Any], high: Any) -> bool:
     """Tell whether counting values beats sorting them."""
-    return bool(array.dtype.kind in "iu" and array.dtype != np.uint64 and high < (1 << 16))
+    return bool(array.dtype.kind in "iu" and array.dtype != np.uint64 and int(high) < (1 << 16))
 
 
 def _listed(values: NDArray[Any]) -> str:

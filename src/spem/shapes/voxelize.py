@@ -173,7 +173,8 @@ def cut_edges(
     values = np.empty(0) if winding is None else winding.reshape(-1)
     parts = []
     for lines in crossings:
-        arguments = (lines.layout, lines.start, lines.where, lines.sign, mask.reshape(-1), values)
+        occupied = mask.any(axis=lines.axis).reshape(-1)
+        arguments = (lines.layout, lines.start, lines.where, lines.sign, occupied, mask.reshape(-1), values)
         nowhere = np.empty(0, np.int64), np.empty(0, np.uint8), np.empty(0)
         count = _cut(*arguments, lines.axis, *nowhere)
         found = np.empty(count, np.int64), np.empty(count, np.uint8), np.empty(count)
@@ -253,6 +254,7 @@ def _cut(
     start: NDArray[np.int64],
     where: NDArray[np.float64],
     sign: NDArray[np.int8],
+    occupied: NDArray[np.bool_],
     mask: NDArray[np.bool_],
     values: NDArray[np.float64],
     axis: int,
@@ -264,6 +266,8 @@ def _cut(
     n_columns, n_rows, n_nodes, column_step, row_step, step = layout
     count = 0
     for line in range(n_rows * n_columns):
+        if not occupied[line]:
+            continue
         node = line // n_columns * row_step + line % n_columns * column_step
         winding, k = 0, start[line]
         while k < start[line + 1] and where[k] <= 0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from spem.errors import LabelError, ReadError
-from spem.search.labels import match_labels, read_labels, unused_labels
+from spem.retrieval.labels import match_labels, read_labels, unused_labels
 
 CLA = "PSB 1\n3 3\n\nanimal 0 0\n\ncat animal 2\n12\n7\n\ndog animal 1\n3\n"
 

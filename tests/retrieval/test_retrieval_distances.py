@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from spem.errors import ParameterError
-from spem.search.distances import correlation_distance, fuse, min_max
+from spem.retrieval.distances import correlation_distance, fuse, min_max
 
 
 def test_agrees_with_numpy_correlation():

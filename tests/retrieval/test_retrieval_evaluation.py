@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spem.errors import LabelError, ParameterError
-from spem.search.evaluation import MEASURES, bulls_eye, evaluate, precision_recall
+from spem.retrieval.evaluation import MEASURES, bulls_eye, evaluate, precision_recall
 
 LABELS = ["a", "a", "a", "b", "b", "c"]
 # Rankings, by hand:  0: 3 1 4 2 5 -> 0 1 0 1 0      3: 0 1 4 2 5 -> 0 0 1 0 0
