@@ -1,0 +1,106 @@
+"""Surfaces: closedness, and the repairs that move no vertex."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from spem.shapes.surface import Surface, mend, merge_vertices
+
+
+@pytest.fixture
+def ball() -> Surface:
+    """Return an icosphere of 320 faces."""
+    return surface_of(trimesh.creation.icosphere(2))
+
+
+def surface_of(*meshes: trimesh.Trimesh) -> Surface:
+    """Return trimesh's meshes as one surface."""
+    mesh = trimesh.util.concatenate(meshes)
+    return Surface(np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64))
+
+
+def test_volume_and_area_are_those_of_a_box() -> None:
+    """A box far from the origin has its exact volume and area."""
+    surface = surface_of(trimesh.creation.box((2, 3, 4)).apply_translation([1000, 0, -7]))
+    assert np.isclose(surface.volume, 24)
+    assert np.isclose(surface.area, 52)
+    assert surface.closed
+
+
+def test_holes_are_counted_by_edges_and_loops(ball: Surface) -> None:
+    """Two missing faces far apart are six open edges in two loops."""
+    faces = np.delete(ball.faces, [0, 200], axis=0)
+    surface = Surface(ball.vertices, faces)
+    assert (len(surface.open_edges), surface.n_loops) == (6, 2)
+    assert mend(surface).repairs == ()
+
+
+def test_edge_of_four_faces_is_closed() -> None:
+    """Two boxes that share an edge are closed, though not a manifold."""
+    one, two = trimesh.creation.box(), trimesh.creation.box().apply_translation([1, 1, 0])
+    assert merge_vertices(surface_of(one, two)).closed
+
+
+def test_flipped_faces_are_turned_back(ball: Surface) -> None:
+    """Faces against their neighbours are turned, the fewest that do it, and told."""
+    faces = ball.faces.copy()
+    faces[[3, 50, 51, 300]] = faces[[3, 50, 51, 300], ::-1]
+    mended = mend(Surface(ball.vertices, faces))
+    assert mended.closed
+    assert np.isclose(mended.volume, ball.volume)
+    assert mended.repairs == ("flipped 4 of 320 faces to agree with their neighbours",)
+
+
+def test_degenerate_and_repeated_faces_are_dropped(ball: Surface) -> None:
+    """A face with a repeated corner and a face that is there twice go, and it is told."""
+    faces = np.concatenate([ball.faces, ball.faces[5:7], [[4, 4, 9]]])
+    mended = mend(Surface(ball.vertices, faces))
+    assert np.array_equal(mended.faces, ball.faces)
+    assert mended.repairs == ("dropped 1 degenerate faces", "dropped 2 repeated faces")
+
+
+def test_double_sided_surface_becomes_single(ball: Surface) -> None:
+    """A ball whose faces are all there from both sides is a ball."""
+    mended = mend(Surface(ball.vertices, np.concatenate([ball.faces, ball.faces[:, ::-1]])))
+    assert np.isclose(mended.volume, ball.volume)
+
+
+def test_inside_out_is_turned_as_a_whole(ball: Surface) -> None:
+    """A mesh of negative volume is turned, with its hollow."""
+    hollow = trimesh.creation.icosphere(2, radius=0.5)
+    outer = trimesh.creation.icosphere(2)
+    outer.invert()
+    surface = surface_of(outer, hollow)
+    mended = mend(surface)
+    assert np.isclose(mended.volume, 0.875 * ball.volume)
+    assert mended.repairs == ("turned the surface right side out",)
+
+
+def test_single_parts_are_turned_unless_they_are_hollows() -> None:
+    """Of two reversed spheres the one in a larger ball is a hollow, the other is turned."""
+    outer, hollow = trimesh.creation.icosphere(2), trimesh.creation.icosphere(2, radius=0.5)
+    beside = trimesh.creation.icosphere(2, radius=0.5).apply_translation([3, 0, 0])
+    hollow.invert()
+    beside.invert()
+    mended = mend(surface_of(outer, hollow, beside))
+    assert np.isclose(mended.volume, outer.volume)
+    assert mended.repairs == ("turned 1 of 3 parts right side out",)
+
+
+def test_island_in_a_hollow_is_a_solid() -> None:
+    """A reversed sphere within the hollow of a shell is turned: there is no solid around it."""
+    parts = [trimesh.creation.icosphere(2, radius=radius) for radius in (1.0, 0.7, 0.3)]
+    parts[1].invert()
+    parts[2].invert()
+    mended = mend(surface_of(*parts))
+    assert np.isclose(mended.volume, parts[0].volume * (1 - 0.7**3 + 0.3**3))
+
+
+def test_surfaces_given_are_not_changed(ball: Surface) -> None:
+    """Mending leaves the arrays it was given alone."""
+    faces = ball.faces[:, ::-1].copy()
+    before = faces.copy()
+    mend(Surface(ball.vertices, faces))
+    assert np.array_equal(faces, before)
