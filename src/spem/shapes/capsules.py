@@ -7,9 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# A cone steeper than this is a ball in all but name; the bound keeps its slope finite.
-STEEPEST = 0.999
-
 
 @dataclass(frozen=True, eq=False)
 class Capsules:
@@ -88,8 +85,11 @@ class Capsules:
         """
         axis = self.end - self.start
         length = np.maximum(np.linalg.norm(axis, axis=1), np.finfo(float).tiny)
-        taper = np.clip(np.diff(self.radius, axis=1)[:, 0] / length, -STEEPEST, STEEPEST)
-        lean = taper / np.sqrt(1 - taper**2)
+        rise = np.diff(self.radius, axis=1)[:, 0] / length
+        slope = np.where(np.abs(rise) < 1, rise, 0.0)
+        lean = slope / np.sqrt(1 - slope**2)
+        # Where one ball holds the other, its centre is the only place on the axis that counts.
+        least, most = np.where(rise >= 1, length, 0.0), np.where(rise <= -1, 0.0, length)
         direction = axis / length[:, None]
         along, square = np.zeros(of.size), np.zeros(of.size)
         for column, start, unit in zip(columns, self.start.T, direction.T, strict=True):
@@ -97,7 +97,6 @@ class Capsules:
             along += to * unit[of]
             square += to * to
         aside = np.sqrt(np.maximum(square - along**2, 0.0))
-        best = np.minimum(np.maximum(along + aside * lean[of], 0.0), length[of])
-        rise = np.diff(self.radius, axis=1)[:, 0] / length
+        best = np.minimum(np.maximum(along + aside * lean[of], least[of]), most[of])
         depth = self.radius[of, 0] + rise[of] * best - np.sqrt((along - best) ** 2 + aside**2)
         return np.asarray(depth)

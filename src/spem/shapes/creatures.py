@@ -6,6 +6,7 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
+import igl
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
@@ -21,6 +22,8 @@ from spem.shapes.skeletons import random_pose, skeleton_kinds
 VOXELS = {2: 6000, 3: 15000}
 # Cells along the longest side of the grid on which a size is measured before the real one is made.
 MEASURED = {2: 96, 3: 40}
+# A body with all its limbs cannot be told with fewer triangles.
+MIN_FACES = 100
 # Pixels along a side of a silhouette, and free pixels around it.
 PIXELS = 160
 MARGIN = 8
@@ -55,7 +58,8 @@ def creature(
     ndim
         2 for the silhouette, axes (row, column), or 3 for the body, axes (x, y, z).
     voxels
-        Number of nodes, met to a few per cent; 6000 in 2-D and 15000 in 3-D by default.
+        Number of nodes, met to a few per cent; 6000 in 2-D and 15000 in 3-D by default. Far below
+        that, thin limbs fall between the voxel centres.
     spacing
         Distance between voxel centres, in place of `voxels`. Creatures are about 2 long.
     rng
@@ -100,7 +104,7 @@ def creature_mesh(
     rng
         Source of chance.
     faces
-        Number of triangles, met to some ten per cent.
+        Number of triangles, or one less.
 
     Returns
     -------
@@ -112,7 +116,7 @@ def creature_mesh(
     Raises
     ------
     ParameterError
-        If there is no such kind.
+        If there is no such kind, or `faces` is below `MIN_FACES`.
 
     Examples
     --------
@@ -120,12 +124,18 @@ def creature_mesh(
     >>> vertices.shape[1], faces.shape[1]
     (3, 3)
     """
+    if faces < MIN_FACES:
+        msg = f"faces must be at least {MIN_FACES}, not {faces}"
+        raise ParameterError(msg)
     body = random_pose(kind, 3, rng)
-    vertices, triangles = _surface(body, _measuring_step(body))
-    # A surface has as many triangles as its area has cells.
-    step = _measuring_step(body) * np.sqrt(len(triangles) / faces)
-    vertices, triangles = _surface(body, float(step))
-    return vertices, triangles
+    step = _measuring_step(body)
+    _, triangles = _surface(body, step)
+    # A surface has as many triangles as its area has cells. Twice the number asked for, and a cell
+    # no wider than the thinnest limb, keep it in one piece before it is thinned out.
+    step = min(step * float(np.sqrt(len(triangles) / (2 * faces))), float(body.radius.min()))
+    vertices, triangles = _surface(body, step)
+    vertices, triangles, _, _ = igl.qslim(vertices, triangles, faces)
+    return vertices, triangles.astype(np.int64)
 
 
 def collection(
@@ -248,6 +258,9 @@ def silhouette(body: Capsules, pixels: int = PIXELS) -> NDArray[np.uint8]:
 
 def _names(kinds: Sequence[str] | None, n_per_class: int) -> list[tuple[str, str]]:
     """Return kinds and names of a collection."""
+    if n_per_class < 1:
+        msg = f"n_per_class must be at least 1, not {n_per_class}"
+        raise ParameterError(msg)
     width = max(2, len(str(n_per_class)))
     chosen = creature_kinds() if kinds is None else kinds
     return [(kind, f"{kind}_{i:0{width}d}") for kind in chosen for i in range(1, n_per_class + 1)]
@@ -277,7 +290,7 @@ def _volume(body: Capsules) -> float:
 def _surface(body: Capsules, step: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the surface of a body by marching cubes."""
     depth, start = _sampled(body, step)
-    vertices, triangles, _, _ = marching_cubes(depth, 0.0, gradient_direction="descent")
+    vertices, triangles, _, _ = marching_cubes(depth, 0.0, gradient_direction="ascent")
     return start + step * vertices.astype(float), triangles.astype(np.int64)
 
 
