@@ -13,6 +13,8 @@ from spem.shapes.shape import FACE_FRACTION, MIN_FRACTION, Shape
 _TINY = 1e-12
 # Within this many voxels of the surface the nearest foot is searched for: interpolation reads those.
 _BAND = 2.5
+# Least cosine, between a foot's normal and the way to it, for which its plane is taken.
+_FACING = 0.5
 
 
 def signed_distance(shape: Shape) -> NDArray[np.float64]:
@@ -53,7 +55,7 @@ def signed_distance(shape: Shape) -> NDArray[np.float64]:
     length = np.sum(weight * along, axis=0) / np.maximum(total, _TINY)
     agrees = (total > _TINY) & (length * np.sum(offset * normal, axis=0) > 0)
     feet = place + np.where(agrees, length * normal, offset)
-    return _search(shape, feet, _to_feet(shape, feet, nearest), beside)
+    return _search(shape, feet, normal, _to_feet(shape, feet, nearest), beside)
 
 
 def _nearest(shape: Shape, at: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -94,7 +96,11 @@ def _normals(shape: Shape, distance: NDArray[np.float64], beside: NDArray[np.int
 
 
 def _search(
-    shape: Shape, feet: NDArray[np.float64], distance: NDArray[np.float64], beside: NDArray[np.int64]
+    shape: Shape,
+    feet: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    beside: NDArray[np.int64],
 ) -> NDArray[np.float64]:
     """Make the distance that to the nearest foot of all, near the surface and at the deepest voxels."""
     rough = np.abs(distance).ravel()
@@ -103,7 +109,11 @@ def _search(
     wanted[beside] = False
     at = np.flatnonzero(wanted)
     place = np.stack(np.unravel_index(at, shape.mask.shape), axis=1) * np.asarray(shape.spacing)
-    found, _ = cKDTree(feet.T).query(place)
+    found, foot = cKDTree(feet.T).query(place)
+    # feet lie about a voxel apart: the plane there is nearer than the foot, unless at a sharp edge
+    to_plane = np.abs(np.sum((place - feet.T[foot]) * normal.T[foot], axis=1))
+    faces = (to_plane > _FACING * found) & (rough[at] < _BAND * step)
+    found = np.where(faces, to_plane, found)
     result = distance.copy().ravel()
     result[at] = np.copysign(found, result[at])
     return result.reshape(shape.mask.shape)
