@@ -1,4 +1,4 @@
-"""Screened Poisson hyperfields for shape coding: shapes in; fields, SPEM maps, codes and ranked answers out."""
+"""Screened Poisson hyperfields: shapes in; fields, SPEM maps, codes and ranked answers out."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _HOME = {
     "synthetic": "spem.shapes.synthetic",
 }
 
-__all__ = sorted(_HOME)  # noqa: PLE0605
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:

@@ -79,7 +79,8 @@ def sweep(
     shape
         Any shape.
     rho
-        The ρ to sample, in the unit of the spacing; by default `n_rho` of them in a range set by the shape's size.
+        The ρ to sample, in the unit of the spacing; by default `n_rho` of them in a range set by the
+        shape's size.
     n_rho, scheme
         Number and spacing of the default samples (``"linear"``, ``"squared"``, ``"log"``).
     boundary
@@ -90,7 +91,7 @@ def sweep(
     Examples
     --------
     >>> import spem
-    >>> spem.sweep(spem.synthetic.disk(radius=20.0)).rho.size
+    >>> spem.sweep(spem.synthetic.disk(radius=20.0, spacing=1.0)).rho.size
     64
     """
     samples = sample_rho(shape.size, count=n_rho, scheme=scheme) if rho is None else check_rho(rho)
@@ -114,7 +115,7 @@ def maps(source: Shape | Hyperfield, n_maps: int = 6, *, centred: bool = False, 
     Examples
     --------
     >>> import spem
-    >>> spem.maps(spem.synthetic.disk(radius=20.0), n_maps=4).basis.shape
+    >>> spem.maps(spem.synthetic.disk(radius=20.0, spacing=1.0), n_maps=4).basis.shape
     (64, 4)
     """
     hyperfield = source if isinstance(source, Hyperfield) else sweep(source, **options)

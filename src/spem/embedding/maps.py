@@ -15,8 +15,8 @@ from spem.shapes.shape import Shape
 if TYPE_CHECKING:
     import xarray
 
-# A last entry below this fraction of the largest cannot carry the sign: rounding or a small change of the shape
-# could flip it.
+# A last entry below this fraction of the largest cannot carry the sign: rounding or a small change of
+# the shape could flip it.
 _SMALL_LAST = 1e-3
 
 
@@ -71,15 +71,16 @@ class Maps:
 
     def __repr__(self) -> str:
         shares = ", ".join(f"{share:.2g}" for share in self.explained)
-        return f"Maps({self.shape.name!r}, {self.values.shape[1]} maps on {self.shape.n_nodes} nodes, explained {shares})"
+        n, k = self.values.shape
+        return f"Maps({self.shape.name!r}, {k} maps on {n} nodes, explained {shares})"
 
 
 def compute_maps(field: Hyperfield, n_maps: int = 6, *, centred: bool = False) -> Maps:
     """Project a hyperfield on its principal components over ρ.
 
     With Y the ``(n_nodes, n_rho)`` matrix of fields, Φ holds the leading eigenvectors of YᵀY and the maps are
-    P = YΦ (4.4). Y is never formed: its singular value decomposition is that of a small matrix, the coefficients
-    in an orthonormal basis, so components are right down to rounding of the strongest one.
+    P = YΦ (4.4). Y is never formed: its singular value decomposition is that of a small matrix, the
+    coefficients in an orthonormal basis, so components are right down to rounding of the strongest one.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def compute_maps(field: Hyperfield, n_maps: int = 6, *, centred: bool = False) -
     Examples
     --------
     >>> import spem
-    >>> result = compute_maps(spem.sweep(spem.synthetic.disk(radius=12.0)), n_maps=3)
+    >>> result = compute_maps(spem.sweep(spem.synthetic.disk(radius=12.0, spacing=1.0)), n_maps=3)
     >>> result.values.shape == (result.shape.n_nodes, 3)
     True
     >>> bool((result.basis[-1] > 0).all())

@@ -31,7 +31,7 @@ class Domain:
     @property
     def n_nodes(self) -> int:
         """Number of nodes."""
-        return self.neighbours.shape[0]
+        return int(self.neighbours.shape[0])
 
 
 def surface_domain(shape: Shape) -> Domain:
@@ -57,8 +57,16 @@ def _domain(shape: Shape, *, use_cuts: bool, default: float) -> Domain:
     return Domain(neighbours, fraction)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _connect(voxels, number, strides, cut_voxel, cut_direction, cut_fraction, default):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+@njit(cache=True, nogil=True)
+def _connect(
+    voxels: NDArray[np.int64],
+    number: NDArray[np.int32],
+    strides: NDArray[np.int64],
+    cut_voxel: NDArray[np.int64],
+    cut_direction: NDArray[np.uint8],
+    cut_fraction: NDArray[np.float64],
+    default: float,
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Neighbour table and boundary fractions; nodes and cuts are both in ascending order of voxel."""
     n, d = voxels.size, strides.size
     neighbours = np.empty((n, 2 * d), np.int32)

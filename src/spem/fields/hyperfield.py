@@ -46,7 +46,7 @@ class Hyperfield:
     Examples
     --------
     >>> import numpy as np, spem
-    >>> field = spem.sweep(spem.synthetic.disk(radius=10.0), rho=[2, 4, 8])
+    >>> field = spem.sweep(spem.synthetic.disk(radius=10.0, spacing=1.0), rho=[2, 4, 8])
     >>> field.fields().shape == (field.shape.n_nodes, 3)
     True
     >>> bool(np.all(field.at(3.0) > field.at(2.5)))  # any ρ in between, without another solve
@@ -64,7 +64,7 @@ class Hyperfield:
     @property
     def rank(self) -> int:
         """Number of basis columns."""
-        return self.basis.shape[1]
+        return int(self.basis.shape[1])
 
     def coefficients(self, rho: ArrayLike | None = None) -> NDArray[np.float64]:
         """Coefficients ``(rank + 1, n_rho)`` of the fields in the constant and the basis columns."""
@@ -113,9 +113,7 @@ class Hyperfield:
             coords |= {f"x{a}": ("node", column) for a, column in enumerate(shape.points.T)}
             return xarray.DataArray(values, coords, ("node", "rho"), shape.name, attributes)
         axes = {f"axis_{a}": values for a, values in enumerate(shape.axes)}
-        return xarray.DataArray(
-            shape.to_grid(values), axes | coords, (*axes, "rho"), shape.name, attributes
-        )
+        return xarray.DataArray(shape.to_grid(values), axes | coords, (*axes, "rho"), shape.name, attributes)
 
     def save(self, path: str | Path) -> None:
         """Write the hyperfield to a zarr group, in its low-rank form (see `spem.fields.storage`)."""
@@ -151,4 +149,5 @@ class Hyperfield:
 
     def __repr__(self) -> str:
         span = f"{self.rho.min():.4g} to {self.rho.max():.4g}"
-        return f"Hyperfield({self.shape.name!r}, {self.shape.n_nodes} nodes, {self.rho.size} rho {span}, rank {self.rank})"
+        sizes = f"{self.shape.n_nodes} nodes, {self.rho.size} rho {span}, rank {self.rank}"
+        return f"Hyperfield({self.shape.name!r}, {sizes})"

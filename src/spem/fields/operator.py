@@ -92,6 +92,6 @@ def assemble(shape: Shape, boundary: Boundary = "surface") -> System:
     weights = 1.0 / np.square(shape.spacing)
     node, direction = np.nonzero(domain.neighbours == domain.n_nodes)
     cut = weights[direction // 2]
-    rhs = np.bincount(node, cut / domain.fraction, domain.n_nodes)
+    rhs = np.bincount(node, cut / domain.fraction, domain.n_nodes).astype(np.float64)
     diagonal = 2 * weights.sum() - np.bincount(node, cut, domain.n_nodes) + rhs
     return System(shape, domain, weights, rhs, diagonal, boundary)

@@ -37,7 +37,9 @@ def check_rho(rho: ArrayLike) -> NDArray[np.float64]:
         msg = f"rho={rho!r}: expected positive numbers"
         raise ParameterError(msg) from error
     if values.ndim != 1 or values.size == 0:
-        msg = f"rho of shape {values.shape}: expected at least one positive number, in the unit of the spacing"
+        msg = (
+            f"rho of shape {values.shape}: expected at least one positive number, in the unit of the spacing"
+        )
         raise ParameterError(msg)
     bad = values[~(values > 0)]
     if bad.size:
@@ -101,7 +103,9 @@ def sample_rho(
     if count < 1:
         msg = f"count={count}: expected at least one ρ"
         raise ParameterError(msg)
-    bounds = check_rho([DEFAULT_RANGE[0] * size if low is None else low, DEFAULT_RANGE[1] * size if high is None else high])
+    bounds = check_rho(
+        [DEFAULT_RANGE[0] * size if low is None else low, DEFAULT_RANGE[1] * size if high is None else high]
+    )
     if not np.all(np.isfinite(bounds)) or bounds[0] >= bounds[1]:
         msg = f"rho from {bounds[0]:g} to {bounds[1]:g}: expected finite bounds in ascending order"
         raise ParameterError(msg)

@@ -41,7 +41,7 @@ def multiply(p: Lanes, q: Lanes, level: Any, shift: Lanes) -> NDArray[np.float64
 def advance_and_relax(
     x: Lanes, r: Lanes, p: Lanes, q: Lanes, z: Lanes, alpha: Lanes, level: Any, shift: Lanes
 ) -> None:
-    """x += alpha p; r -= alpha q; then one forward Gauss-Seidel sweep for z from zero."""
+    """Add alpha p to x, subtract alpha q from r, then do one forward Gauss-Seidel sweep for z from zero."""
     neighbours, weight, step, diagonal, mass = level
     s, a = load(shift, 0), load(alpha, 0)
     for i in range(neighbours.shape[0]):
@@ -103,7 +103,7 @@ def correct_and_relax(
 
 @njit(cache=True, nogil=True)
 def turn(z: Lanes, p: Lanes, beta: Lanes, n: int) -> None:
-    """p = z + beta p, the next search directions."""
+    """Make p = z + beta p, the next search directions."""
     b = load(beta, 0)
     for i in range(n):
         store(p, i, add(load(z, i), mul(b, load(p, i))))
@@ -111,7 +111,7 @@ def turn(z: Lanes, p: Lanes, beta: Lanes, n: int) -> None:
 
 @njit(cache=True, nogil=True)
 def apply_dense(r: Lanes, z: Lanes, inverse: Lanes) -> None:
-    """z = inverse r on the coarsest level; row ``i * n + j`` of `inverse` holds entry (i, j) of all lanes."""
+    """Write z = inverse r on the coarsest level; row ``i * n + j`` of `inverse` is its entry (i, j)."""
     n = r.shape[0] - 1
     for i in range(n):
         value = mul(load(inverse, i * n), load(r, 0))
@@ -163,7 +163,7 @@ def coarsen(aggregate: Table, n_coarse: int, level: Any) -> Any:
 def aggregate_voxels(
     voxels: NDArray[np.int64], shape: NDArray[np.int64], coarse_shape: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], Table]:
-    """Number the 2^d blocks that hold a node; return the block's flat coarse index, and each node's block."""
+    """Group nodes in 2^d blocks; return the flat coarse index of each block, and the block of each node."""
     d = shape.size
     size = 1
     for a in range(d):

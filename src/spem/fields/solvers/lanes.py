@@ -7,7 +7,6 @@ runs with the widest instructions it has.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
@@ -21,7 +20,7 @@ _DOUBLE = ir.VectorType(ir.DoubleType(), LANES)
 _FLAGS = ("contract",)
 
 
-class LanesType(types.Type):
+class LanesType(types.Type):  # type: ignore[misc]
     """A vector of `LANES` numbers held in registers."""
 
 
@@ -30,7 +29,7 @@ double = LanesType(f"lanes_float64x{LANES}")
 
 
 @register_model(LanesType)
-class _LanesModel(models.PrimitiveModel):
+class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, numba_type: LanesType) -> None:
         super().__init__(manager, numba_type, _SINGLE if numba_type is single else _DOUBLE)
 
@@ -81,7 +80,7 @@ def store(typing_context: Any, array: Any, row: Any, value: Any) -> Any:
     return types.void(array, types.intp, value), codegen
 
 
-def _binary(operation: str) -> Callable[..., Any]:
+def _binary(operation: str) -> Any:
     @intrinsic
     def apply(typing_context: Any, a: Any, b: Any) -> Any:
         def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -100,7 +99,7 @@ div = _binary("fdiv")
 
 @intrinsic
 def splat(typing_context: Any, number: Any) -> Any:
-    """The same number in all lanes, at its own precision."""
+    """Put the same number in all lanes, at its own precision."""
     vector = _SINGLE if number == types.float32 else _DOUBLE
 
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -1,8 +1,8 @@
 """Block multigrid on the nodes of a shape: the preconditioner of the sweep over ρ.
 
-Unsmoothed aggregation of 2^d blocks keeps the 2d+1-point structure on every level, so one set of kernels serves
-all levels and dimensions; one Gauss-Seidel sweep goes down and one, in reverse order, up, which makes the cycle
-symmetric.
+Unsmoothed aggregation of 2^d blocks keeps the 2d+1-point structure on every level, so one set of kernels
+serves all levels and dimensions; one Gauss-Seidel sweep goes down and one, in reverse order, up, which makes
+the cycle symmetric.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class Cycle:
         """Complete the cycle whose forward sweep on the finest level is done; return r·z by lane."""
         if len(self.levels) == 1:
             kernels.apply_dense(r, self.z[0], self._inverse)
-            return np.einsum("il,il->l", r, self.z[0], dtype=np.float64)[None]
+            return np.asarray(np.einsum("il,il->l", r, self.z[0], dtype=np.float64))[None]
         return self._descend(0, r)
 
     def apply(self, r: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -52,7 +52,9 @@ class Solver(Protocol):
         ...
 
 
-def relative_residual(system: System, values: NDArray[np.float64], rho: NDArray[np.float64]) -> NDArray[np.float64]:
+def relative_residual(
+    system: System, values: NDArray[np.float64], rho: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """‖b - (A + I/ρ²) v‖ / ‖b‖ of each field, in double precision."""
     product = system.matrix() @ values + values / np.square(rho)
     residual = np.linalg.norm(system.rhs[:, None] - product, axis=0)

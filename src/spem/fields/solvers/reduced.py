@@ -1,8 +1,8 @@
 """Galerkin reduced basis of the deficits u = 1 - v: all ρ from a few solves.
 
-Every u(s) solves (A + s) u = s·1, s = 1/ρ². In a basis B of solutions at a few s, the constant among them, the
-Galerkin solution y(s) of (K + s M) y = s c with K = BᵀAB, M = BᵀB, c = Bᵀ1 is the best approximation of
-u(s) in the energy norm, at the price of a small dense solve.
+Every u(s) solves (A + s) u = s·1, s = 1/ρ². In a basis B of solutions at a few s, the constant among them,
+the Galerkin solution y(s) of (K + s M) y = s c with K = BᵀAB, M = BᵀB, c = Bᵀ1 is the best approximation
+of u(s) in the energy norm, at the price of a small dense solve.
 """
 
 from __future__ import annotations
@@ -85,14 +85,16 @@ class ReducedBasis:
         block = np.zeros((self.n_nodes + 1, LANES), self.dtype)
         kernels.combine(vectors, mix, np.ascontiguousarray(remove[:1]), block, False)
         for k, old in enumerate(self.blocks):
-            kernels.combine(old, np.ascontiguousarray(remove[1 + k * LANES :][:LANES]), remove[:1], block, True)
+            kernels.combine(
+                old, np.ascontiguousarray(remove[1 + k * LANES :][:LANES]), remove[:1], block, True
+            )
         self._append(block)
 
     def compress(self, shifts: Small, tolerance: float) -> tuple[NDArray[Any], Small, Small]:
         """Rotate to the fewest columns that carry the deficits of `shifts`, orthogonal to the constant.
 
-        Returns the columns ``(n_nodes, rank)`` and the mass and stiffness of the constant and the columns. What is
-        dropped changes no deficit by more than `tolerance` in the root mean square.
+        Returns the columns ``(n_nodes, rank)`` and the mass and stiffness of the constant and the columns.
+        What is dropped changes no deficit by more than `tolerance` in the root mean square.
         """
         used = np.flatnonzero(np.diag(self.mass) > 0)
         upper = np.linalg.cholesky(self.mass[np.ix_(used, used)]).T

@@ -1,6 +1,6 @@
 """Numba kernels of the reduced basis, in double precision whatever the basis is stored in.
 
-A block is an ``(n + 1, LANES)`` array of columns with a last row of zeros; the constant column 1 is never stored.
+A block is an ``(n + 1, LANES)`` array of columns with a last row of zeros; the constant is never stored.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def cross_operator(
 def true_residual(
     u: Block, r: Block, neighbours: NDArray[np.int32], weights: Small, diagonal: Small, shift: Small
 ) -> None:
-    """r = shift - (A + shift) u: how far u is from the deficit 1 - v."""
+    """Write r = shift - (A + shift) u: how far u is from the deficit 1 - v."""
     s = load(shift, 0)
     for i in range(neighbours.shape[0]):
         value = sub(s, mul(add(splat(diagonal[i]), s), load_wide(u, i)))

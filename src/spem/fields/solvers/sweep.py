@@ -1,10 +1,10 @@
-"""All ρ for about the price of one: block multigrid conjugate gradients at a few poles, and a Galerkin basis.
+"""All ρ for about the price of one: block multigrid CG at a few poles, and a Galerkin basis.
 
-With the boundary eliminated every ρ has the same right-hand side, and the matrices differ by a multiple of the
-identity. The deficits u = 1 - v of all ρ lie, to any useful accuracy, in a space of some ten dimensions. So eight
-shifts are solved at once as the lanes of one array, in single precision; their span predicts all other ρ; the
-true residual of the prediction at eight further shifts, taken in double precision, measures its error and is what
-the next eight are solved for, until the error is below the tolerance everywhere.
+With the boundary eliminated every ρ has the same right-hand side, and the matrices differ by a multiple of
+the identity. The deficits u = 1 - v of all ρ lie, to any useful accuracy, in a space of some ten dimensions.
+So eight shifts are solved at once as the lanes of one array, in single precision; their span predicts all
+other ρ; the true residual of the prediction at eight further shifts, taken in double precision, measures its
+error and is what the next eight are solved for, until the error is below the tolerance everywhere.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from spem.fields.solvers.multigrid import Cycle, Hierarchy, rows
 from spem.fields.solvers.protocol import Solution
 from spem.fields.solvers.reduced import ReducedBasis
 
-# Poles of the first block, as fractions of the logarithmic range of the shifts: Chebyshev nodes stretched to the
-# largest shift, where the fields vary fastest (worst error over hands, combs and balls; see benchmarks/poles.py).
+# Poles of the first block, as fractions of the logarithmic range of the shifts: Chebyshev nodes stretched
+# to the largest shift, where the fields vary fastest. Least worst error over hands, combs and balls.
 _LOWEST_POLE = 0.06
-# A block is solved to this fraction of the tolerance, or of its own start: single precision reaches no further.
+# A block is solved to this fraction of the tolerance, or of its own start: single precision ends there.
 _MARGIN, _SINGLE_LIMIT = 0.2, 1e-6
 # Basis columns kept in single precision err by about 1e-7 of the field.
 _SINGLE_STORAGE = 3e-7
@@ -107,7 +107,7 @@ class Sweep:
 
 
 class _Block:
-    """Work space for `LANES` shifts: measures what the basis predicts for them, then solves for what it misses."""
+    """Work space for `LANES` shifts: measures what the basis misses at them, then solves for it."""
 
     def __init__(self, hierarchy: Hierarchy, basis: ReducedBasis, options: Sweep) -> None:
         n = basis.n_nodes
@@ -115,7 +115,9 @@ class _Block:
         self.x, self.r, self.z = rows(n), rows(n), rows(n)
         # The prediction and the search directions are never needed at the same time.
         self.u = np.zeros((n + 1, LANES))
-        self.p, self.q = (half.reshape(n + 1, LANES) for half in self.u.reshape(-1).view(np.float32).reshape(2, -1))
+        self.p, self.q = (
+            half.reshape(n + 1, LANES) for half in self.u.reshape(-1).view(np.float32).reshape(2, -1)
+        )
         self.iterations = 0
 
     def measure(self, shifts: Small) -> float:
@@ -182,7 +184,7 @@ def _candidates(targets: Small) -> Small:
 
 
 def _next_poles(poles: Small, candidates: Small) -> Small:
-    """Eight more shifts, each where ∏|s - p|/(s + p), the decay of the rational interpolant, is largest (Leja)."""
+    """Eight more shifts, each where the rational interpolant's ∏|s - p|/(s + p) is largest (Leja)."""
     if candidates.size <= LANES:
         return np.pad(candidates, (0, LANES - candidates.size), mode="edge")
     chosen = list(poles)

@@ -1,0 +1,131 @@
+"""Hyperfields on disk: a zarr group with the low-rank form and the shape it belongs to."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+
+from spem.errors import ReadError
+from spem.fields.hyperfield import Hyperfield
+from spem.shapes.shape import Cuts, Report, Shape
+
+FORMAT = 1
+# Nodes in a chunk: about a megabyte of basis.
+_CHUNK = 32_768
+
+
+def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
+    """Write a hyperfield to the zarr group `path`, replacing one that is there.
+
+    The group is written beside its place and moved there when it is whole.
+
+    Parameters
+    ----------
+    field
+        The hyperfield.
+    path
+        Folder of the group, by custom ``*.zarr``.
+
+    Examples
+    --------
+    >>> import spem, tempfile
+    >>> field = spem.sweep(spem.synthetic.disk(radius=8.0, spacing=1.0), rho=[2, 4])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_hyperfield(field, f"{folder}/disk.zarr")
+    ...     load_hyperfield(f"{folder}/disk.zarr")
+    Hyperfield('disk', 193 nodes, 2 rho 2 to 4, rank 2)
+    """
+    target = Path(path)
+    draft = target.with_name(target.name + ".part")
+    shutil.rmtree(draft, ignore_errors=True)
+    group = zarr.open_group(draft, mode="w")
+    shape, cuts = field.shape, field.shape.cuts
+    arrays: dict[str, NDArray[Any]] = {
+        "basis": field.basis,
+        "mass": field.mass,
+        "stiffness": field.stiffness,
+        "rho": field.rho,
+        "voxels": shape.voxels,
+        "cut_voxel": cuts.voxel,
+        "cut_direction": cuts.direction,
+        "cut_fraction": cuts.fraction,
+    }
+    if shape.affine is not None:
+        arrays["affine"] = shape.affine
+    for name, values in arrays.items():
+        chunks = (min(_CHUNK, max(values.shape[0], 1)), *values.shape[1:])
+        group.create_array(name, shape=values.shape, dtype=values.dtype, chunks=chunks)
+        group[name][...] = values  # type: ignore[index]
+    group.attrs.update(
+        {
+            "spem_hyperfield": FORMAT,
+            "name": shape.name,
+            "grid": list(shape.mask.shape),
+            "spacing": list(shape.spacing),
+            "origin": list(shape.origin),
+            "boundary": field.boundary,
+            "error": field.error,
+            "report": asdict(shape.report),
+        }
+    )
+    shutil.rmtree(target, ignore_errors=True)
+    draft.rename(target)
+
+
+def load_hyperfield(path: str | Path) -> Hyperfield:
+    """Read a hyperfield that `save_hyperfield` wrote.
+
+    Raises
+    ------
+    ReadError
+        If there is no such group, or it is not a whole hyperfield of this format.
+    """
+    try:
+        group = zarr.open_group(path, mode="r")
+        attributes = dict(group.attrs)
+    except (OSError, ValueError, KeyError) as error:
+        msg = f"{path}: no hyperfield there ({error}); give a folder that Hyperfield.save wrote"
+        raise ReadError(msg) from error
+    if attributes.get("spem_hyperfield") != FORMAT:
+        found = attributes.get("spem_hyperfield")
+        msg = (
+            f"{path}: expected a hyperfield of format {FORMAT}, found {found}; write it again with this spem"
+        )
+        raise ReadError(msg)
+    try:
+        arrays = {name: np.asarray(array[...]) for name, array in group.arrays()}
+        return _assemble(attributes, arrays)
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        msg = f"{path}: the hyperfield is damaged ({error}); write it again"
+        raise ReadError(msg) from error
+
+
+def _assemble(attributes: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Hyperfield:
+    """Put shape and hyperfield together from what was stored."""
+    mask = np.zeros(attributes["grid"], bool)
+    mask.reshape(-1)[arrays["voxels"]] = True
+    report = attributes["report"]
+    shape = Shape(
+        mask,
+        tuple(attributes["spacing"]),
+        tuple(attributes["origin"]),
+        attributes["name"],
+        Cuts(arrays["cut_voxel"], arrays["cut_direction"], arrays["cut_fraction"]),
+        Report(**{**report, "repairs": tuple(report["repairs"])}),
+        arrays.get("affine"),
+    )
+    return Hyperfield(
+        shape,
+        arrays["rho"],
+        arrays["basis"],
+        arrays["mass"],
+        arrays["stiffness"],
+        attributes["boundary"],
+        attributes["error"],
+    )
