@@ -58,7 +58,7 @@ def test_degenerate_and_repeated_faces_are_dropped(ball: Surface) -> None:
     faces = np.concatenate([ball.faces, ball.faces[5:7], [[4, 4, 9]]])
     mended = mend(Surface(ball.vertices, faces))
     assert np.array_equal(mended.faces, ball.faces)
-    assert mended.repairs == ("dropped 1 degenerate faces", "dropped 2 repeated faces")
+    assert mended.repairs == ("dropped 1 degenerate face", "dropped 2 repeated faces")
 
 
 def test_double_sided_surface_becomes_single(ball: Surface) -> None:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from spem.shapes.crossings import cross_lines
 from spem.shapes.shape import MIN_FRACTION
-from spem.shapes.surface import Surface
+from spem.shapes.surface import Surface, merge_vertices
 from spem.shapes.voxelize import Filling, Lattice, lattice_around, voxelize
 
 
@@ -173,6 +173,36 @@ def test_touching_parts_leave_no_gap() -> None:
     filling, _ = fill(surface_of(box((0, 0, 0), (4, 4, 2.3)), box((0, 0, 2.3), (4, 4, 4))), 1.0)
     assert np.count_nonzero(filling.mask) == 64
     assert len(filling.cuts) == n_boundary_edges(filling.mask)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.25, 0.5]))
+@settings(max_examples=20, deadline=None)
+def test_surface_of_voxels_is_filled_with_those_voxels(seed: int, shift: float) -> None:
+    """Voxels whose faces, edges and corners touch in every way are found again, corner on node or not."""
+    wanted = np.zeros((8, 8, 8), bool)
+    wanted[1:-1, 1:-1, 1:-1] = np.random.default_rng(seed).random((6, 6, 6)) < 0.5
+    surface = merge_vertices(voxel_surface(wanted))
+    assert surface.closed
+    # voxel i spans i - 1/2 to i + 1/2; a shift of one half puts its lower corner on node i
+    filling = voxelize(surface.vertices + shift, surface.faces, Lattice((0.0,) * 3, (1.0,) * 3, (8, 8, 8)))
+    assert np.array_equal(filling.mask, wanted)
+    assert len(filling.cuts) == n_boundary_edges(wanted)
+    up = filling.cuts.direction % 2 == 1
+    assert np.allclose(filling.cuts.fraction[up], 0.5 + shift)
+    assert np.allclose(filling.cuts.fraction[~up], max(0.5 - shift, MIN_FRACTION))
+
+
+def voxel_surface(mask: np.ndarray) -> Surface:
+    """Return the faces between inside and outside voxels, two triangles each, without shared corners."""
+    corners = []
+    for axis in range(3):
+        square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) - 0.5
+        quad = np.insert(square, 0, 0.5, axis=1)[:, np.argsort([axis, (axis + 1) % 3, (axis + 2) % 3])]
+        change = np.diff(mask.astype(np.int8), axis=axis)
+        corners += [np.argwhere(change < 0)[:, None] + quad, np.argwhere(change > 0)[:, None] + quad[::-1]]
+    vertices = np.concatenate(corners)
+    faces = np.arange(4 * len(vertices)).reshape(-1, 4)[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    return Surface(vertices.reshape(-1, 3), faces)
 
 
 @given(st.integers(0, 2**32 - 1), st.tuples(*[st.integers(-5, 5)] * 3))

@@ -112,14 +112,14 @@ def cross_lines(
     return Crossings(axis, shape, start, where, sign)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _meet_row(lower: NDArray[np.float64], upper: NDArray[np.float64], row: int) -> tuple[float, float]:
     """Return column and depth where an edge meets a row, always computed from its lower end."""
     fraction = (row - lower[1]) / (upper[1] - lower[1])
     return lower[0] + fraction * (upper[0] - lower[0]), lower[2] + fraction * (upper[2] - lower[2])
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _scan(
     points: NDArray[np.float64],
     faces: NDArray[np.int64],
@@ -162,7 +162,7 @@ def _scan(
                 cursor[line] += 1
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _sort_lines(start: NDArray[np.int64], where: NDArray[np.float64], sign: NDArray[np.int8]) -> None:
     """Sort the crossings of each line by position, entering first; lines hold few crossings."""
     for line in range(start.size - 1):

@@ -17,7 +17,7 @@ from spem.shapes.distance import signed_distance
 from spem.shapes.limits import DEFAULT_VOXELS, check_size
 from spem.shapes.mesh_files import load_mesh
 from spem.shapes.shape import Report, Shape
-from spem.shapes.surface import Surface, mend, merge_vertices
+from spem.shapes.surface import Surface, count_of, mend, merge_vertices
 from spem.shapes.voxelize import lattice_around, voxelize
 from spem.shapes.winding import fill_by_winding
 
@@ -196,7 +196,9 @@ class _Filler:
             raise ShapeError(msg)
         report = self.report
         if filling.n_reversed:
-            report = report.with_repair(f"left out {filling.n_reversed} voxels wound around backwards")
+            report = report.with_repair(
+                f"left out {count_of(filling.n_reversed, 'voxel')} wound around backwards"
+            )
         shape = Shape.from_mask(
             filling.mask, steps, origin=lattice.origin, name=self.name, cuts=filling.cuts, report=report
         )
@@ -223,7 +225,8 @@ def _filler(
     method, repairs = "scanline filling", surface.repairs
     if not surface.closed:
         method = "generalised winding number"
-        repairs += (f"filled over {len(surface.open_edges)} open edges in {surface.n_loops} loops",)
+        edges, loops = count_of(len(surface.open_edges), "open edge"), count_of(surface.n_loops, "loop")
+        repairs += (f"filled over {edges} in {loops}",)
     report = Report(source=source, method=method, watertight=watertight, repairs=repairs)
     return _Filler(surface, report, components, memory_limit, name)
 
@@ -277,10 +280,9 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, name: str) -> Surface:
     if not np.isfinite(points[triangles]).all():
         msg = f"{name}: some vertices are not finite; expected coordinates x y z"
         raise ShapeError(msg)
-    used, index = np.unique(triangles, return_inverse=True)
-    if used.size < len(points):
-        points, triangles = points[used], index.reshape(-1, 3)
-    return Surface(points, triangles)
+    used = np.zeros(len(points), bool)
+    used[triangles] = True
+    return Surface(points[used], (np.cumsum(used) - 1)[triangles])
 
 
 def _steps(spacing: float | tuple[float, float, float], name: str) -> tuple[float, float, float]:

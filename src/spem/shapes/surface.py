@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,8 +125,8 @@ def merge_vertices(surface: Surface) -> Surface:
     >>> surface.closed, merge_vertices(surface).closed
     (False, True)
     """
-    vertices, index = np.unique(surface.vertices, axis=0, return_inverse=True)
-    return Surface(vertices, index.reshape(-1)[surface.faces], surface.repairs)
+    first, index = _distinct_rows(surface.vertices)
+    return Surface(surface.vertices[first], index[surface.faces], surface.repairs)
 
 
 def mend(surface: Surface) -> Surface:
@@ -159,6 +160,28 @@ def mend(surface: Surface) -> Surface:
     return _turn_parts(surface)
 
 
+def count_of(n: int, noun: str) -> str:
+    """Return a number with its noun, in the plural where it must be.
+
+    Examples
+    --------
+    >>> count_of(1, "loop"), count_of(2, "loop")
+    ('1 loop', '2 loops')
+    """
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
+def _distinct_rows(rows: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first place of each distinct row, and which of them each row is."""
+    order = np.lexsort(rows.T)
+    ordered = rows[order]
+    new = np.ones(len(rows), bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    index = np.empty(len(rows), np.int64)
+    index[order] = np.cumsum(new) - 1
+    return order[new], index
+
+
 def _connect(edges: NDArray[np.int64], n: int) -> tuple[int, NDArray[np.int64]]:
     """Return the number of connected components of a graph and the component of each node."""
     graph = coo_array((np.ones(len(edges), bool), (edges[:, 0], edges[:, 1])), shape=(n, n))
@@ -170,12 +193,12 @@ def _drop_faces(surface: Surface) -> Surface:
     """Drop faces with a repeated corner, and all but one of the faces with the same corners."""
     ordered = np.sort(surface.faces, axis=1)
     proper = np.flatnonzero((ordered[:, 0] != ordered[:, 1]) & (ordered[:, 1] != ordered[:, 2]))
-    _, first = np.unique(ordered[proper], axis=0, return_index=True)
+    first, _ = _distinct_rows(ordered[proper])
     repairs = []
     if n := len(surface.faces) - proper.size:
-        repairs.append(f"dropped {n} degenerate faces")
+        repairs.append(f"dropped {count_of(n, 'degenerate face')}")
     if n := proper.size - first.size:
-        repairs.append(f"dropped {n} repeated faces")
+        repairs.append(f"dropped {count_of(n, 'repeated face')}")
     return surface.with_faces(surface.faces[proper[np.sort(first)]], *repairs) if repairs else surface
 
 

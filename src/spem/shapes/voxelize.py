@@ -185,7 +185,7 @@ def cut_edges(
     return Cuts(voxel, direction, np.clip(fraction, MIN_FRACTION, 1.0))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _wind(
     layout: tuple[int, int, int, int, int, int],
     start: NDArray[np.int64],
@@ -211,7 +211,7 @@ def _wind(
             node += step
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _changes(
     i: int,
     ends: tuple[float, float],
@@ -248,7 +248,7 @@ def _changes(
     return first, last
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _cut(
     layout: tuple[int, int, int, int, int, int],
     start: NDArray[np.int64],
