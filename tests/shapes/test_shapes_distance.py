@@ -32,7 +32,7 @@ def test_distance_of_a_ball_is_found_within_a_fraction_of_a_voxel(shape, spacing
     assert np.sqrt(np.mean(error**2)) < 0.03
     assert error.max() < 0.15
     assert found.max() == pytest.approx(there.max(), abs=0.1)
-    assert np.abs(found - there)[made.mask].max() < 0.4
+    assert np.abs(found - there)[made.mask].max() < 0.5
     assert np.array_equal(found > 0, made.mask)
 
 

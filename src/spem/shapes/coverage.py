@@ -66,8 +66,7 @@ def coverage_cuts(coverage: NDArray[np.floating], inside: NDArray[np.bool_]) -> 
     >>> coverage_cuts(ramp, ramp > 0.5).fraction[:2]
     array([0.2, 0.8])
     """
-    shares = np.clip(coverage, 0.0, 1.0).astype(np.float64)
-    framed = np.pad(shares, 2, mode="edge")
+    framed = np.pad(np.clip(coverage, 0.0, 1.0), 2, mode="edge")
     parts = []
     for direction, start, end in boundary_edges(inside):
         near = _offset(framed, start, inside.shape[1], direction // 2)
@@ -80,12 +79,13 @@ def coverage_cuts(coverage: NDArray[np.floating], inside: NDArray[np.bool_]) -> 
 
 
 def _offset(
-    framed: NDArray[np.float64], flat: NDArray[np.int64], width: int, axis: int
+    framed: NDArray[np.floating], flat: NDArray[np.int64], width: int, axis: int
 ) -> NDArray[np.float64]:
     """Distance along an axis from pixel centres to the edge through them, positive from inside."""
     row, column = np.divmod(flat, width)
     place = np.arange(5)
     patch = framed[row[:, None, None] + place[:, None], column[:, None, None] + place]  # (n, 5, 5)
+    patch = patch.astype(np.float64, copy=False)
     m0, m1 = _normal(patch)
     small, large = np.minimum(m0, m1), np.maximum(m0, m1)
     share = patch[:, 2, 2]
