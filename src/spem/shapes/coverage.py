@@ -84,8 +84,9 @@ def _offset(
     """Distance along an axis from pixel centres to the edge through them, positive from inside."""
     row, column = np.divmod(flat, width)
     place = np.arange(5)
-    patch = framed[row[:, None, None] + place[:, None], column[:, None, None] + place]  # (n, 5, 5)
-    patch = patch.astype(np.float64, copy=False)
+    patch: NDArray[np.float64] = framed[
+        row[:, None, None] + place[:, None], column[:, None, None] + place
+    ].astype(np.float64)  # (n, 5, 5)
     m0, m1 = _normal(patch)
     small, large = np.minimum(m0, m1), np.maximum(m0, m1)
     share = patch[:, 2, 2]
