@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from spem.maps.spem import Maps
+    from spem.embedding.maps import Maps
     from spem.plots.camera import View
     from spem.shapes.shape import Shape
 

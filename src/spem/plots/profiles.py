@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
     from numpy.typing import ArrayLike, NDArray
 
+    from spem.embedding.maps import Maps
     from spem.fields.hyperfield import Hyperfield
-    from spem.maps.spem import Maps
     from spem.shapes.shape import Shape
 
 PICTURE_PIXELS = (480, 480)

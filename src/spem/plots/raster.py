@@ -147,7 +147,7 @@ def _mesh(
     return corner, triangle, value
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True)
 def _rasterise(
     projected: NDArray[np.float64], faces: NDArray[np.int64], width: int, height: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:

@@ -62,7 +62,7 @@ def write_report(
     map_pictures
         Up to `n` PNG files, of the first shapes in order; None where there is none.
     scores, curve
-        What `spem.search` makes of the distances and labels.
+        What `spem.retrieval` makes of the distances and labels.
     distances
         ``(n, n)`` distances between shapes, for the queries answered worst and best.
     settings
