@@ -107,7 +107,9 @@ def render_surface(
     if min(fine) < 1:
         msg = f"a picture needs at least one pixel each way, not size={size}"
         raise ParameterError(msg)
-    camera = Camera.fit(corner[triangle.ravel()], view, fine)
+    used = np.zeros(len(corner), bool)
+    used[triangle] = True
+    camera = Camera.fit(corner[used], view, fine)
     projected = camera.project(corner)
     height, face, weight = _rasterise(projected, triangle, fine[0], fine[1])
     seen = face >= 0
@@ -212,9 +214,13 @@ def _light(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _crease(height: NDArray[np.float64], seen: NDArray[np.bool_], extent: int) -> NDArray[np.float64]:
     """How much darker a pixel is for lying behind its surroundings; 0 to 0.25."""
-    width = max(CREASE_WIDTH * extent, 1.0)
+    # The surroundings are smooth: one sample of each pixel is enough to know them.
+    coarse = (slice(None, None, SAMPLES),) * 2
+    width = max(CREASE_WIDTH * extent / SAMPLES, 1.0)
+    covered = gaussian_filter(seen[coarse].astype(np.float32), width)
     depth = np.where(seen, height, 0.0)
-    around = gaussian_filter(depth, width) / np.maximum(gaussian_filter(seen * 1.0, width), 1e-6)
+    blurred = gaussian_filter(depth[coarse].astype(np.float32), width) / np.maximum(covered, 1e-6)
+    around = blurred.repeat(SAMPLES, axis=0).repeat(SAMPLES, axis=1)
     behind = (around - depth)[seen] / (CREASE_DEPTH * extent)
     darker: NDArray[np.float64] = 0.25 * np.clip(behind, 0, 1)
     return darker
