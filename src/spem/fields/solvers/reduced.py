@@ -51,7 +51,8 @@ class ReducedBasis:
         used = np.diag(self.mass) > 0
         stiffness, mass = self.stiffness[np.ix_(used, used)], self.mass[np.ix_(used, used)]
         c = mass[0]
-        y[used] = np.stack([np.linalg.solve(stiffness + s * mass, s * c) for s in shifts], axis=1)
+        for j, s in enumerate(shifts):
+            y[used, j] = np.linalg.solve(stiffness + s * mass, s * c)
         return y
 
     def combine(self, y: Small, out: NDArray[Any]) -> None:

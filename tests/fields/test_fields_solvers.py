@@ -1,0 +1,159 @@
+"""Every solver on the same table: what a screened Poisson field must be, whoever computes it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from mpmath import mp, mpf
+
+import spem
+from spem.errors import ConvergenceError, ParameterError
+from spem.fields.operator import assemble
+from spem.fields.solvers.cg import ConjugateGradient
+from spem.fields.solvers.direct import Direct
+from spem.fields.solvers.explicit import ExplicitIteration
+from spem.fields.solvers.sweep import Sweep
+from spem.shapes.shape import Cuts, Shape
+
+SOLVERS = {
+    "direct": Direct(),
+    "cg": ConjugateGradient(rtol=1e-12),
+    "explicit": ExplicitIteration(rtol=1e-11),
+    "sweep": Sweep(rtol=1e-10),
+}
+EXACT = 1e-8  # what all of them reach on the small shapes below
+
+
+def hand(fingers: int = 4) -> Shape:
+    """A palm with thin fingers: bulky and thin at once."""
+    mask = np.zeros((44, 30), bool)
+    mask[20:, 4:] = True
+    for k in range(fingers):
+        mask[2:20, 4 + 7 * k : 8 + 7 * k] = True
+    return Shape.from_mask(mask, name="hand")
+
+
+def blob(seed: int = 0) -> Shape:
+    """A 3-D shape with random cuts on its boundary edges."""
+    rng = np.random.default_rng(seed)
+    x = np.stack(np.meshgrid(*[np.linspace(-1, 1, 11)] * 3, indexing="ij"))
+    shape = Shape.from_mask(np.sum(x**2, axis=0) + 0.3 * x[0] * x[1] < 0.8, (1.0, 1.5, 0.8), name="blob")
+    table = assemble(shape).domain.neighbours
+    node, direction = np.nonzero(table == shape.n_nodes)
+    cuts = Cuts(shape.voxels[node], direction.astype(np.uint8), rng.uniform(0.01, 1.0, node.size))
+    return Shape(shape.mask, shape.spacing, shape.origin, "blob", cuts)
+
+
+@pytest.fixture(params=SOLVERS)
+def solver(request):
+    return SOLVERS[request.param]
+
+
+@pytest.mark.parametrize("make", [hand, blob])
+@pytest.mark.parametrize("boundary", ["surface", "voxel"])
+def test_solves_the_equations(solver, make, boundary):
+    """The field satisfies the linear system, computed independently in dense algebra."""
+    system = assemble(make(), boundary)
+    rho = np.array([0.7, 3.0, 40.0, np.inf])
+    dense = system.matrix().toarray()
+    exact = [np.linalg.solve(dense + np.eye(len(dense)) / r**2, system.rhs) for r in rho]
+    solution = solver.solve(system, rho)
+    assert solution.converged
+    assert np.abs(solution.values - np.stack(exact, axis=1)).max() < EXACT
+
+
+def test_field_lies_in_zero_one_and_grows_with_rho(solver):
+    """0 < v <= 1; v grows with ρ at every node and is one for ρ = inf."""
+    v = solver.solve(assemble(hand()), np.array([1.0, 2.0, 5.0, 20.0, np.inf])).values
+    assert np.all(v > -EXACT)
+    assert np.all(v <= 1 + EXACT)
+    assert np.all(np.diff(v, axis=1) > -EXACT)
+    assert np.allclose(v[:, -1], 1.0, atol=EXACT)
+
+
+def test_rotation_permutes_the_field(solver):
+    """A rotation by 90 degrees permutes the field."""
+    shape = hand()
+    turned = Shape.from_mask(np.rot90(shape.mask))
+    v, w = (s.to_grid(solver.solve(assemble(s), np.array([3.0])).values[:, 0]) for s in (shape, turned))
+    assert np.allclose(np.rot90(v), w, atol=EXACT, equal_nan=True)
+
+
+def test_unit_of_length_does_not_matter(solver):
+    """Scaling spacing and ρ together leaves the field as it is."""
+    shape = hand()
+    scaled = Shape(shape.mask, (1e-3, 1e-3), (0.0, 0.0))
+    v = solver.solve(assemble(shape), np.array([2.5])).values
+    assert np.allclose(solver.solve(assemble(scaled), np.array([2.5e-3])).values, v, atol=EXACT)
+
+
+@pytest.mark.parametrize(
+    "cheap", [ConjugateGradient(max_iterations=2), ExplicitIteration(max_iterations=3), Sweep(max_blocks=0)]
+)
+def test_failure_is_a_value_and_then_an_error(cheap):
+    """A solve that misses its tolerance says so, and the error carries its best iterate."""
+    system = assemble(hand())
+    solution = cheap.solve(system, np.array([5.0]))
+    assert not solution.converged
+    with pytest.raises(
+        ConvergenceError, match=r"hand: residual .* after \d+ iterations; raise rtol"
+    ) as caught:
+        solution.checked("hand")
+    assert caught.value.solution.values.shape == (system.n_nodes, 1)
+
+
+def test_failed_sweep_never_returns_a_hyperfield():
+    """The hyperfield of a sweep that misses its tolerance is an error, not a field."""
+    with pytest.raises(ConvergenceError, match="hand: residual"):
+        Sweep(max_blocks=0).hyperfield(assemble(hand()), np.linspace(2, 9, 20))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    hnp.arrays(bool, hnp.array_shapes(min_dims=1, max_dims=3, min_side=1, max_side=9)).filter(np.any),
+    st.lists(st.floats(0.2, 1e4), min_size=1, max_size=12),
+    st.sampled_from(["surface", "voxel"]),
+)
+def test_sweep_agrees_with_the_direct_solver(mask, rho, boundary):
+    """On any mask and any ρ the sweep keeps its tolerance, in few dimensions or many, few ρ or many."""
+    system = assemble(Shape.from_mask(mask), boundary)
+    wanted = np.array(rho)
+    error = np.abs(Sweep().solve(system, wanted).values - Direct().solve(system, wanted).values)
+    assert error.max() <= 1e-6
+
+
+def test_direct_solution_is_right_in_every_entry():
+    """A value of 1e-60 deep inside is right to 1e-10 of itself, against 80-digit arithmetic."""
+    length, rho = 121, mpf("0.4")
+    mp.dps = 80
+    a = mp.acosh(1 + 1 / (2 * rho**2))
+    half = (length + 1) // 2
+    exact = [mp.cosh(a * (i + 1 - half)) / mp.cosh(a * half) for i in range(length)]
+    v = Direct().solve(assemble(Shape.from_mask(np.ones(length)), "voxel"), np.array([0.4])).values[:, 0]
+    assert min(exact) < 1e-50
+    assert max(abs(mpf(x) / y - 1) for x, y in zip(v.tolist(), exact, strict=True)) < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("rho", "message"),
+    [
+        (0.0, "rho=0: expected a positive length"),
+        (-2.0, "rho=-2: expected a positive length"),
+        (float("nan"), "rho=nan: expected a positive length"),
+        ([], "expected at least one positive number"),
+        ("wide", "rho='wide': expected positive numbers"),
+    ],
+)
+def test_bad_rho_is_refused(rho, message):
+    """A ρ that is not a positive length is named."""
+    with pytest.raises(ParameterError, match=message):
+        spem.field(hand(), rho)
+
+
+def test_a_shape_of_one_node_has_a_field():
+    """The smallest shape there is has the closed form of one equation."""
+    v = spem.field(Shape.from_mask(np.ones((1, 1))), 1.0, boundary="voxel")
+    assert v == pytest.approx([4 / 5], abs=1e-9)
