@@ -15,6 +15,8 @@ CODE_FORMAT = 1
 
 BoundaryKind = Literal["surface", "voxel"]
 SchemeKind = Literal["linear", "squared", "log"]
+ComponentsKind = Literal["largest", "all"]
+_CHOICES = {"boundary": BoundaryKind, "scheme": SchemeKind, "components": ComponentsKind}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +28,12 @@ class Settings:
     voxels
         Number of voxels inside a shape, reached by choice of the spacing; None keeps the grid
         of images and volumes.
+    threshold
+        Grey level of the surface, of images and grey volumes; found for each where None.
+    dark
+        Whether shapes are darker than the background, of images; found for each where None.
+    components
+        Whether the largest component of a shape is kept or all.
     boundary
         Where the boundary lies: ``"surface"`` at the cuts, ``"voxel"`` as in the paper.
     rho_ranges
@@ -62,6 +70,9 @@ class Settings:
     """
 
     voxels: int | None = 15_000
+    threshold: float | None = None
+    dark: bool | None = None
+    components: ComponentsKind = "largest"
     boundary: BoundaryKind = "surface"
     rho_ranges: tuple[tuple[float, float], ...] = ((0.0255, 0.255),)
     scheme: SchemeKind = "linear"
@@ -94,7 +105,7 @@ class Settings:
             if value is not None and value < 1:
                 msg = f"{name}={value} must be at least 1"
                 raise ParameterError(msg)
-        for name, kind in (("boundary", BoundaryKind), ("scheme", SchemeKind)):
+        for name, kind in _CHOICES.items():
             if getattr(self, name) not in get_args(kind):
                 msg = f"{name}={getattr(self, name)!r} must be one of {', '.join(get_args(kind))}"
                 raise ParameterError(msg)
