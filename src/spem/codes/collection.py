@@ -1,0 +1,275 @@
+"""Codes of a collection of files: features of each, a vocabulary from some, a code for all."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from spem.codes.codes import Codes, Failure
+from spem.codes.features import node_features, sweep_bands
+from spem.codes.listing import Listing
+from spem.codes.model import Model
+from spem.codes.settings import Settings
+from spem.codes.sources import Source, as_source, read_shapes, source_name, source_path
+from spem.codes.work import Entry, Work
+from spem.codes.workers import one_line, run_all
+from spem.errors import ModelError, ReadError, ShapeError, SpemError
+from spem.shapes.shape import Shape
+
+# Training shapes beyond these change the vocabulary by less than another seed does; they bound the memory.
+TRAINING_SHAPES = 1000
+_NOTHING = "no shape could be read, so there are no codes; see the failures"
+
+Progress = Callable[[str, int, int], None]
+
+
+def encode_collection(
+    sources: Sequence[str | Path | Shape],
+    settings: Settings | None = None,
+    *,
+    model: Model | None = None,
+    known: Codes | None = None,
+    n_jobs: int = 1,
+    work: str | Path | None = None,
+    progress: Progress | None = None,
+    on_failure: Callable[[Failure], None] | None = None,
+) -> Codes:
+    """Make the codes of a collection.
+
+    The features of every file are computed first and kept in the work folder; a vocabulary is
+    learnt from those of at most `TRAINING_SHAPES` shapes; codes are made of them one at a time.
+    The result depends on what the files hold, not on their order or on the number of workers.
+
+    Parameters
+    ----------
+    sources
+        Files, as `spem.codes.sources.find_files` lists them, or shapes.
+    settings
+        How a file becomes a code; those of the model where one is given.
+    model
+        A vocabulary to reuse, in place of learning one.
+    known
+        Codes from which shapes of equal content are taken over; their model is reused.
+    n_jobs
+        Number of processes.
+    work
+        Folder in which what is done survives an interruption; the same call goes on from it, and
+        it is removed at the end. Without it nothing survives.
+    progress
+        Called with a stage (``"fields"``, ``"codes"``), the number of sources done and of all.
+    on_failure
+        Called for each failure when it happens.
+
+    Returns
+    -------
+    Codes
+        One row a shape in the order of the sources, and the failures.
+
+    Raises
+    ------
+    ReadError
+        When no source gave a shape.
+    ModelError
+        When `settings`, `model` and `known` do not go together.
+
+    Examples
+    --------
+    >>> squares = [Shape.from_mask(np.ones((n, n)), name=f"square {n}") for n in (9, 12)]
+    >>> codes = encode_collection(squares, Settings(voxels=None, n_maps=2, n_centers=4))
+    >>> codes.names, codes.vectors.shape
+    (('square 9', 'square 12'), (2, 8))
+    """
+    if known is not None:
+        model = known.model if model is None else model
+        known.require_same_model(model, "the vocabulary")
+    chosen = _settings(settings, model)
+    listing = Listing(sources, on_failure)
+    reused = _reusable(known)
+    with ExitStack() as stack:
+        root = Path(work if work is not None else stack.enter_context(tempfile.TemporaryDirectory()))
+        folder = Work.open(root, chosen, model)
+        wanted = {key: source for key, source in listing.first.items() if key not in reused}
+        _compute(wanted, _Task(folder, chosen, model), n_jobs, listing, progress or (lambda *_: None))
+        fitted = model or _fit(folder, [key for key in wanted if key not in listing.broken], chosen)
+        codes = _assemble(listing, folder, reused, fitted, progress or (lambda *_: None))
+        if work is not None:
+            folder.remove()
+    return codes
+
+
+def encode_file(source: str | Path | Shape, model: Model) -> NDArray[np.float32]:
+    """Make the code of one file or shape with a model.
+
+    Parameters
+    ----------
+    source
+        A file that holds one shape, or a shape.
+    model
+        The model of the codes that it is to be compared with.
+
+    Returns
+    -------
+    NDArray
+        ``(n_code,)`` code, the same as in a collection.
+
+    Raises
+    ------
+    SpemError
+        When the file cannot be read or coded.
+    ShapeError
+        When it holds several labels.
+
+    Examples
+    --------
+    >>> square = Shape.from_mask(np.ones((9, 9)))
+    >>> model = encode_collection([square], Settings(voxels=None, n_maps=2, n_centers=4)).model
+    >>> encode_file(square, model).shape
+    (8,)
+    """
+    with threadpool_limits(1):
+        entries = _entries(as_source(source), model.settings, model)
+    if len(entries) != 1:
+        msg = f"{source}: holds {len(entries)} labels; encode the file and query by one of its shapes"
+        raise ShapeError(msg)
+    if entries[0].reason:
+        raise ShapeError(entries[0].reason)
+    return np.asarray(entries[0].arrays[0], np.float32)
+
+
+def merge(existing: Codes, new: Codes) -> Codes:
+    """Return codes with new ones added; those of the same files are replaced.
+
+    Parameters
+    ----------
+    existing, new
+        Codes of one model.
+
+    Raises
+    ------
+    ModelError
+        When the models differ.
+
+    Examples
+    --------
+    >>> square = Shape.from_mask(np.ones((9, 9)))
+    >>> codes = encode_collection([square], Settings(voxels=None, n_maps=2, n_centers=4))
+    >>> len(merge(codes, codes))
+    1
+    """
+    given = {*new.paths, *(failure.path for failure in new.failures)}
+    stays = existing.take([i for i, path in enumerate(existing.paths) if path not in given])
+    failures = tuple(failure for failure in existing.failures if failure.path not in given)
+    return replace(stays, failures=failures).join(new)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What workers do with a source: compute its entries and leave them in the work folder."""
+
+    folder: Work
+    settings: Settings
+    model: Model | None
+
+    def __call__(self, item: tuple[str, Source]) -> None:
+        key, source = item
+        self.folder.save(key, _entries(source, self.settings, self.model))
+
+
+def _entries(source: Source, settings: Settings, model: Model | None) -> list[Entry]:
+    """Compute the features of every shape of a source, or its code where there is a model."""
+    entries = []
+    for suffix, shape in read_shapes(source, settings):
+        if isinstance(shape, SpemError):
+            entries.append(Entry(suffix, one_line(shape)))
+            continue
+        bands = node_features(sweep_bands(shape, settings), settings)
+        entries.append(Entry(suffix, arrays=bands if model is None else (model.encode(bands, shape.name),)))
+    return entries
+
+
+def _compute(
+    wanted: dict[str, Source], task: _Task, n_jobs: int, listing: Listing, progress: Progress
+) -> None:
+    """Bring the work folder up to date; files that fail are noted with their reason."""
+    todo = [(key, source) for key, source in wanted.items() if not task.folder.done(key)]
+    done = len(wanted) - len(todo)
+    progress("fields", done, len(wanted))
+    for (key, source), _, reason in run_all(task, todo, n_jobs):
+        done += 1
+        if reason:
+            listing.fail(source, reason, key)
+        progress("fields", done, len(wanted))
+
+
+def _fit(folder: Work, keys: list[str], settings: Settings) -> Model:
+    """Learn a vocabulary from a sample of the sources, chosen and ordered by their content."""
+    if not keys:
+        raise ReadError(_NOTHING)
+    ranked = sorted(keys, key=lambda key: hashlib.sha256(f"{settings.seed} {key}".encode()).digest())
+    with threadpool_limits(1):
+        return Model.fit(settings, folder.features(ranked, TRAINING_SHAPES))
+
+
+def _assemble(
+    listing: Listing, folder: Work, reused: dict[str, list[Entry]], model: Model, progress: Progress
+) -> Codes:
+    """Make the code of every shape, in the order of the sources."""
+    names, paths, hashes, vectors = [], [], [], []
+    coded = dict(reused)
+    for done, (source, key) in enumerate(listing, 1):
+        if key is None or listing.fails_again(key, source):
+            continue
+        if key not in coded:
+            coded[key] = [_coded(entry, model) for entry in folder.load(key)]
+        for entry in coded[key]:
+            if entry.reason:
+                listing.fail(source, f"{entry.suffix.lstrip('-')}: {entry.reason}")
+                continue
+            names.append(source_name(source) + entry.suffix)
+            paths.append(source_path(source))
+            hashes.append(key)
+            vectors.append(entry.arrays[0])
+        progress("codes", done, len(listing.sources))
+    if not vectors:
+        raise ReadError(_NOTHING)
+    return Codes(tuple(names), tuple(paths), tuple(hashes), np.stack(vectors), model, tuple(listing.failures))
+
+
+def _coded(entry: Entry, model: Model) -> Entry:
+    """Turn features into a code; codes and failures stay as they are."""
+    if entry.reason or entry.arrays[0].ndim == 1:
+        return entry
+    return replace(entry, arrays=(model.encode(entry.arrays),))
+
+
+def _reusable(known: Codes | None) -> dict[str, list[Entry]]:
+    """Index known codes by content; of copies of a file under several names the first counts."""
+    if known is None:
+        return {}
+    first: dict[str, str] = {}
+    rows: dict[str, list[Entry]] = {}
+    for name, path, key, vector in zip(known.names, known.paths, known.hashes, known.vectors, strict=True):
+        if first.setdefault(key, path) == path:
+            suffix = name.removeprefix(source_name(Path(path)))
+            rows.setdefault(key, []).append(Entry(suffix, arrays=(vector,)))
+    return rows
+
+
+def _settings(settings: Settings | None, model: Model | None) -> Settings:
+    """Return the settings to use; with a model they must be its own."""
+    if model is None:
+        return settings or Settings()
+    if settings is not None and settings != model.settings:
+        mine, theirs = settings.to_json(), model.settings.to_json()
+        odd = [f"{key} {mine[key]} against {theirs[key]}" for key in mine if mine[key] != theirs[key]]
+        msg = f"the vocabulary was made with other settings ({'; '.join(odd)}); leave them out or learn another"
+        raise ModelError(msg)
+    return model.settings

@@ -1,0 +1,94 @@
+"""Node features: the maps of each band of ρ, all from one sweep of the shape."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.codes.bands import Bands
+from spem.codes.settings import Settings
+from spem.embedding.maps import compute_maps
+from spem.errors import ShapeError
+from spem.fields.domain import surface_domain
+from spem.fields.hyperfield import Hyperfield
+from spem.fields.operator import assemble
+from spem.fields.rho import sample_rho
+from spem.fields.solvers.sweep import Sweep
+from spem.shapes.shape import Shape
+
+# Single precision stores the features, and codes change by less than with another seed.
+_SWEEP_RTOL = 1e-6
+
+
+def sweep_bands(shape: Shape, settings: Settings) -> Hyperfield:
+    """Sweep a shape over the ρ of all bands at once.
+
+    Parameters
+    ----------
+    shape
+        The shape.
+    settings
+        Bands of ρ, in units of the shape's size, and the boundary.
+
+    Examples
+    --------
+    >>> from spem.shapes.synthetic import disk
+    >>> sweep_bands(disk(radius=10.0, spacing=1.0), Settings()).rho.size
+    64
+    """
+    low, high = (
+        pick(bound) for pick, bound in zip((min, max), zip(*settings.rho_ranges, strict=True), strict=True)
+    )
+    rho = sample_rho(shape.size, low * shape.size, high * shape.size, max(settings.n_rho, 2), "log")
+    return Sweep(rtol=_SWEEP_RTOL).hyperfield(assemble(shape, settings.boundary), rho)
+
+
+def node_features(field: Hyperfield, settings: Settings) -> Bands:
+    """Compute the maps of every band from one hyperfield.
+
+    Parameters
+    ----------
+    field
+        Hyperfield of the shape over the ρ of all bands, as `sweep_bands` makes it.
+    settings
+        Bands, number of ρ and of maps.
+
+    Returns
+    -------
+    tuple
+        For each band ``(n_nodes, n_maps)`` maps in float32, over the same nodes.
+
+    Raises
+    ------
+    ShapeError
+        When no node is left without the boundary.
+
+    Examples
+    --------
+    >>> from spem.shapes.synthetic import disk
+    >>> settings = Settings(n_maps=4)
+    >>> field = sweep_bands(disk(radius=10.0, spacing=1.0), settings)
+    >>> [block.shape[1] for block in node_features(field, settings)]
+    [4]
+    """
+    size, keep = field.shape.size, _kept(field.shape, drop_boundary=settings.drop_boundary)
+    blocks: list[NDArray[Any]] = []
+    for low, high in settings.rho_ranges:
+        rho = sample_rho(size, low * size, high * size, settings.n_rho, settings.scheme)
+        maps = compute_maps(replace(field, rho=rho), settings.n_maps, centred=settings.centred)
+        blocks.append(np.ascontiguousarray(maps.values[keep], np.float32))
+    return tuple(blocks)
+
+
+def _kept(shape: Shape, *, drop_boundary: bool) -> Any:
+    """Select all nodes, or those without a boundary edge."""
+    if not drop_boundary:
+        return slice(None)
+    inner = (surface_domain(shape).neighbours < shape.n_nodes).all(axis=1)
+    if not inner.any():
+        msg = f"{shape.name}: every node is next to the boundary; use more voxels or keep the boundary"
+        raise ShapeError(msg)
+    return inner

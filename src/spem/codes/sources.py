@@ -1,0 +1,202 @@
+"""Where the shapes of a collection come from: files found, told apart by their bytes, and read."""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+from spem.codes.codes import file_hash
+from spem.codes.settings import Settings
+from spem.errors import ReadError, SpemError
+from spem.shapes.components import keep_components
+from spem.shapes.read import (
+    IMAGE_SUFFIXES,
+    MESH_SUFFIXES,
+    TIFF_SUFFIXES,
+    VOLUME_SUFFIXES,
+    read,
+)
+from spem.shapes.shape import Shape
+
+Source: TypeAlias = Path | Shape
+_KINDS = (*IMAGE_SUFFIXES, *VOLUME_SUFFIXES, *MESH_SUFFIXES)
+
+
+def find_files(paths: Iterable[str | Path]) -> list[Path]:
+    """List the files that paths stand for: files, folders with all below them, and patterns.
+
+    Parameters
+    ----------
+    paths
+        A file is taken whatever its kind; of a folder the files of a known kind, in order of name,
+        without hidden ones; a pattern such as ``shapes/*.obj`` or ``shapes/**/*.obj`` is expanded
+        where no file has that very name.
+
+    Returns
+    -------
+    list of pathlib.Path
+        Each file once, in the order of the paths.
+
+    Raises
+    ------
+    ReadError
+        When a path or a pattern leads to nothing.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     for name in ("b.obj", "a.png", "notes.txt"):
+    ...         _ = Path(folder, name).write_bytes(b"")
+    ...     [path.name for path in find_files([folder])]
+    ['a.png', 'b.obj']
+    """
+    found: dict[Path, None] = {}
+    for given in paths:
+        path = Path(given)
+        if path.is_dir():
+            inside = _walk(path)
+            if not inside:
+                msg = f"{path}: no shape in this folder; expected files of kind {', '.join(_KINDS)}"
+                raise ReadError(msg)
+            found |= dict.fromkeys(inside)
+        elif path.exists() or not glob.has_magic(str(given)):
+            found[path] = None
+        else:
+            hits = sorted(Path(hit) for hit in glob.glob(str(given), recursive=True))  # noqa: PTH207
+            if not hits:
+                msg = f"{given}: no file fits this pattern; check it, or give a folder"
+                raise ReadError(msg)
+            found |= dict.fromkeys(hit for hit in hits if hit.is_file())
+    return list(found)
+
+
+def as_source(source: str | Path | Shape) -> Source:
+    """Return a path or a shape."""
+    return source if isinstance(source, Shape) else Path(source)
+
+
+def source_path(source: Source) -> str:
+    """Return the path as it was given, or the name of a shape."""
+    return source.name if isinstance(source, Shape) else str(source)
+
+
+def source_hash(source: Source) -> str:
+    """Return the SHA-256, in hex, of a file's bytes or of what makes up a shape.
+
+    Raises
+    ------
+    ReadError
+        When the file cannot be read.
+
+    Examples
+    --------
+    >>> square, other = (Shape.from_mask(np.ones((2, 2)), name=name) for name in "ab")
+    >>> source_hash(square) == source_hash(other)
+    True
+    """
+    if isinstance(source, Path):
+        return file_hash(source)
+    digest = hashlib.sha256(f"{source.mask.shape} {source.spacing}".encode())
+    for array in (source.mask, source.cuts.voxel, source.cuts.direction, source.cuts.fraction):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def source_name(source: Source) -> str:
+    """Return the name for people: a file's without its ending, a shape's own.
+
+    Examples
+    --------
+    >>> source_name(Path("scans/tooth.nii.gz"))
+    'tooth'
+    """
+    if isinstance(source, Shape):
+        return source.name
+    name = source.name[:-3] if source.name.lower().endswith(".gz") else source.name
+    return Path(name).stem
+
+
+def read_shapes(source: Source, settings: Settings) -> Iterator[tuple[str, Shape | SpemError]]:
+    """Read the shapes of a source, as the settings say: one for each label of a label volume.
+
+    Parameters
+    ----------
+    source
+        A file or a shape.
+    settings
+        Number of voxels, threshold, polarity and components.
+
+    Yields
+    ------
+    suffix
+        What tells the shape from others of the source, ``"-3"`` for label 3; else empty.
+    shape
+        The shape, or the error where a label gave none.
+
+    Raises
+    ------
+    SpemError
+        When the file as a whole cannot be read.
+
+    Examples
+    --------
+    >>> [(_, shape)] = read_shapes(Shape.from_mask(np.ones((5, 5))), Settings(voxels=None))
+    >>> shape.n_nodes
+    25
+    """
+    name = source_name(source)
+    if isinstance(source, Path) and settings.threshold is None and _is_volume(source):
+        from spem.shapes.volumes import read_labels
+
+        for found in read_labels(source, name=name):
+            yield found.name.removeprefix(name), _resampled(found, settings)
+        return
+    if isinstance(source, Shape):
+        yield "", read(source, voxels=settings.voxels)
+        return
+    grey = not _ends(source, MESH_SUFFIXES)
+    yield (
+        "",
+        read(
+            source,
+            voxels=settings.voxels,
+            threshold=settings.threshold if grey else None,
+            dark=settings.dark if grey and not _is_volume(source) else None,
+            components=settings.components,
+            name=name,
+        ),
+    )
+
+
+def _resampled(shape: Shape, settings: Settings) -> Shape | SpemError:
+    """Bring the shape of a label to its voxels; an error is a value, so that other labels go on."""
+    try:
+        return read(keep_components(shape, settings.components), voxels=settings.voxels)
+    except SpemError as error:
+        return error
+
+
+def _is_volume(path: Path) -> bool:
+    """Tell a volume from an image, which for a TIFF depends on its pages."""
+    if _ends(path, TIFF_SUFFIXES) and path.is_file():
+        from spem.shapes.stacks import tiff_pages
+
+        return tiff_pages(path) > 1
+    return _ends(path, VOLUME_SUFFIXES)
+
+
+def _walk(folder: Path) -> list[Path]:
+    """List the files of a known kind below a folder, without hidden ones."""
+    inside = (path for path in folder.rglob("*") if path.is_file() and _ends(path, _KINDS))
+    return sorted(p for p in inside if not any(part.startswith(".") for part in p.relative_to(folder).parts))
+
+
+def _ends(path: Path, suffixes: tuple[str, ...]) -> bool:
+    """Tell whether a file's name ends in one of the suffixes, in either case."""
+    return path.name.lower().endswith(suffixes)

@@ -1,0 +1,115 @@
+"""The work folder of a collection: what each source came to, kept until the whole is done."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.codes.container import content_hash, read_container, write_container
+from spem.codes.model import Model
+from spem.codes.settings import Settings
+from spem.errors import ParameterError, SpemError
+
+_KIND = "work"
+# Settings that change codes but not the features that they are made of.
+_LATER = ("n_centers", "power", "scale", "nodes_per_shape", "seed")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What one shape of a source came to.
+
+    Parameters
+    ----------
+    suffix
+        What tells the shape from others of its source.
+    reason
+        Why there is nothing, or empty.
+    arrays
+        Node features of each band ``(n_nodes, n_maps)``, or one code ``(n_code,)``.
+    """
+
+    suffix: str
+    reason: str = ""
+    arrays: tuple[NDArray[Any], ...] = ()
+
+
+@dataclass(frozen=True)
+class Work:
+    """A folder with a file for each source that is done, named by the hash of the source.
+
+    Parameters
+    ----------
+    folder
+        Where the files lie; one for each digest of settings or model.
+    """
+
+    folder: Path
+
+    @classmethod
+    def open(cls, root: Path, settings: Settings, model: Model | None = None) -> Work:
+        """Make the folder under `root` that belongs to these settings, or to this model.
+
+        Raises
+        ------
+        ParameterError
+            When the folder cannot be made.
+        """
+        values = {key: value for key, value in settings.to_json().items() if key not in _LATER}
+        digest = content_hash({"features": values}, {})[:12] if model is None else model.digest
+        folder = root / digest
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            msg = f"{root}: the work folder cannot be made ({error.strerror}); write to another folder"
+            raise ParameterError(msg) from error
+        return cls(folder)
+
+    def done(self, key: str) -> bool:
+        """Tell whether a source is there, whole."""
+        try:
+            self.load(key)
+        except SpemError:
+            return False
+        return True
+
+    def save(self, key: str, entries: list[Entry]) -> None:
+        """Write what a source came to, in one step."""
+        header = {"shapes": [[entry.suffix, entry.reason, len(entry.arrays)] for entry in entries]}
+        arrays = {f"{i}.{j}": a for i, entry in enumerate(entries) for j, a in enumerate(entry.arrays)}
+        write_container(self.folder / f"{key}.work", _KIND, header, arrays)
+
+    def load(self, key: str) -> list[Entry]:
+        """Read what a source came to.
+
+        Raises
+        ------
+        ReadError
+            When it is not there, or damaged.
+        """
+        header, arrays = read_container(self.folder / f"{key}.work", _KIND)
+        return [
+            Entry(suffix, reason, tuple(np.asarray(arrays[f"{i}.{j}"]) for j in range(count)))
+            for i, (suffix, reason, count) in enumerate(header["shapes"])
+        ]
+
+    def features(self, keys: list[str], limit: int) -> Iterator[tuple[NDArray[Any], ...]]:
+        """Yield the node features of the sources, at most `limit` shapes."""
+        left = limit
+        for key in keys:
+            for entry in self.load(key):
+                if entry.arrays and left > 0:
+                    left -= 1
+                    yield entry.arrays
+
+    def remove(self) -> None:
+        """Delete the folder, and the one above when it is empty."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+        if self.folder.parent.is_dir() and not any(self.folder.parent.iterdir()):
+            self.folder.parent.rmdir()

@@ -1,0 +1,102 @@
+"""Work shared out to processes: results as they come, failures as values, a clean end on Ctrl-C."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
+
+from joblib import Parallel, delayed, parallel_config
+from joblib.externals.loky.process_executor import TerminatedWorkerError
+from threadpoolctl import threadpool_limits
+
+from spem.errors import ParameterError, SpemError
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+def one_line(error: BaseException) -> str:
+    """Return the message of an error on one line; of an unexpected one with its type.
+
+    Examples
+    --------
+    >>> one_line(KeyError("a"))
+    "unexpected KeyError: 'a'; please report it"
+    """
+    text = " ".join(str(error).split())
+    return (
+        text
+        if isinstance(error, SpemError)
+        else f"unexpected {type(error).__name__}: {text}; please report it"
+    )
+
+
+def run_all(work: Callable[[T], R], tasks: Iterable[T], n_jobs: int = 1) -> Iterator[tuple[T, R | None, str]]:
+    """Run a function over tasks, each with one thread, and yield outcomes as they come.
+
+    Parameters
+    ----------
+    work
+        Function of a module; its results must be small, since they pass between processes.
+    tasks
+        Its arguments.
+    n_jobs
+        Number of processes; with 1, and for a single task, all runs in this one.
+
+    Yields
+    ------
+    task, result, reason
+        The result, or None and on one line why there is none.
+
+    Raises
+    ------
+    ParameterError
+        When `n_jobs` is below 1.
+
+    Examples
+    --------
+    >>> [(result, reason) for _, result, reason in run_all(int, ["7"])]
+    [(7, '')]
+    """
+    if n_jobs < 1:
+        msg = f"n_jobs={n_jobs} must be at least 1"
+        raise ParameterError(msg)
+    left = dict(enumerate(tasks))
+    if n_jobs == 1 or len(left) <= 1:
+        with threadpool_limits(1):
+            for task in left.values():
+                yield task, *_attempt(work, task)
+        return
+    try:
+        for index, result, reason in _spread(work, left, n_jobs):
+            yield left.pop(index), result, reason
+    except TerminatedWorkerError:
+        # One task took its process down and the pool with it: the rest runs one task a pool.
+        for index in list(left):
+            try:
+                [(_, result, reason)] = list(_spread(work, {index: left[index]}, 2))
+            except TerminatedWorkerError:
+                result, reason = None, "its process died, perhaps for want of memory"
+            yield left.pop(index), result, reason
+
+
+def _spread(work: Callable[[T], R], tasks: dict[int, T], n_jobs: int) -> Iterator[tuple[int, R | None, str]]:
+    """Run tasks in processes of one thread each; results come in the order in which they are done."""
+    with parallel_config(backend="loky", inner_max_num_threads=1):
+        pool = Parallel(n_jobs=n_jobs, return_as="generator_unordered", max_nbytes=None)
+        yield from pool(delayed(_in_process)(work, index, task) for index, task in tasks.items())
+
+
+def _in_process(work: Callable[[T], R], index: int, task: T) -> tuple[int, R | None, str]:
+    """Run one task in a worker. Ctrl-C reaches all processes; the parent ends the workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return index, *_attempt(work, task)
+
+
+def _attempt(work: Callable[[T], R], task: T) -> tuple[R | None, str]:
+    """Run one task; an error of any kind is a value, so that one bad file does not end the rest."""
+    try:
+        return work(task), ""
+    except Exception as error:  # noqa: BLE001
+        return None, one_line(error)

@@ -1,0 +1,73 @@
+"""Ranked answers to a query: the shapes of a collection, nearest first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from spem.codes.codes import Codes
+from spem.errors import ParameterError
+from spem.retrieval.distances import correlation_distance
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One shape that answers a query.
+
+    Parameters
+    ----------
+    rank
+        Place among the answers, from 1.
+    name, path
+        The shape, as its codes name it.
+    distance
+        Correlation distance to the query, in [0, 2].
+    """
+
+    rank: int
+    name: str
+    path: str
+    distance: float
+
+
+def rank(query: ArrayLike, codes: Codes, k: int | None = 10) -> list[Answer]:
+    """Rank the shapes of a collection by correlation distance to a query (section 5.5).
+
+    Parameters
+    ----------
+    query
+        ``(n_code,)`` code of the query, made with the model of the collection.
+    codes
+        The collection.
+    k
+        Number of answers; all with None.
+
+    Returns
+    -------
+    list of Answer
+        Nearest first, equally near ones in the order of the collection.
+
+    Raises
+    ------
+    ParameterError
+        If `k` is below 1, or the query is no code of the collection's model.
+
+    Examples
+    --------
+    >>> from spem.codes.model import Model
+    >>> from spem.codes.settings import Settings
+    >>> model = Model(Settings(n_maps=1, n_centers=3), (np.ones(1),), (np.zeros((3, 1), np.float32),))
+    >>> codes = Codes(("a", "b"), ("a.png", "b.png"), ("0", "1"), [[1, 0, 0], [0, 0, 1]], model)
+    >>> [(answer.rank, answer.name) for answer in rank([0, 0, 2], codes)]
+    [(1, 'b'), (2, 'a')]
+    """
+    if k is not None and k < 1:
+        msg = f"k={k} must be at least 1"
+        raise ParameterError(msg)
+    distances = correlation_distance(np.atleast_2d(np.asarray(query, float)), codes.vectors)[0]
+    order = np.argsort(distances, kind="stable")[:k]
+    return [
+        Answer(place, codes.names[i], codes.paths[i], float(distances[i])) for place, i in enumerate(order, 1)
+    ]
