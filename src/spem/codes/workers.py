@@ -85,7 +85,7 @@ def _spread(work: Callable[[T], R], tasks: dict[int, T], n_jobs: int) -> Iterato
     """Run tasks in processes of one thread each; results come in the order in which they are done."""
     with parallel_config(backend="loky", inner_max_num_threads=1):
         pool = Parallel(n_jobs=n_jobs, return_as="generator_unordered", max_nbytes=None)
-        yield from pool(delayed(_in_process)(work, index, task) for index, task in tasks.items())
+        yield from pool(delayed(_in_process)(work, index, task) for index, task in list(tasks.items()))
 
 
 def _in_process(work: Callable[[T], R], index: int, task: T) -> tuple[int, R | None, str]:
