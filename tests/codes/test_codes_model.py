@@ -49,7 +49,7 @@ def test_digest_tells_settings_and_vocabularies_apart(model):
     assert Model.fit(SETTINGS, shapes()).digest == model.digest
     assert Model.fit(SETTINGS, shapes(3)).digest != model.digest
     other = Settings(n_maps=3, n_centers=4, rho_ranges=SETTINGS.rho_ranges, voxels=99)
-    assert Model(other, model.deviations, model.centers).digest != model.digest
+    assert Model(other, model.normalisations, model.centers).digest != model.digest
     assert len(model.digest) == 12
 
 
@@ -62,7 +62,7 @@ def test_maps_of_other_bands_are_refused(model):
 def test_arrays_must_fit_the_settings(model):
     """A model is refused whose arrays are not those of its settings."""
     with pytest.raises(ModelError, match="2 bands, 4 centres and 3 maps got arrays"):
-        Model(SETTINGS, model.deviations[:1], model.centers)
+        Model(SETTINGS, model.normalisations, (model.centers[0], model.centers[1][:2]))
 
 
 def test_model_of_a_later_method_is_refused(model, tmp_path, monkeypatch):

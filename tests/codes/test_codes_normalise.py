@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spem.codes.normalise import relative_deviations, unit_rms
+from spem.codes.normalise import Normalisation, relative_deviations, unit_rms
 from spem.errors import ParameterError
 
 
@@ -53,3 +53,33 @@ def test_deviations_of_constant_maps_are_refused():
     """Maps that nowhere vary cannot be weighted."""
     with pytest.raises(ParameterError, match="no projection varies"):
         relative_deviations([np.ones((5, 2))])
+
+
+def test_whitened_nodes_have_unit_covariance():
+    """Over the training nodes whitened features have mean zero and covariance one."""
+    rng = np.random.default_rng(0)
+    unit = [unit_rms(rng.normal(2, 1, (300, 3)) @ rng.normal(size=(3, 3))) for _ in range(4)]
+    normal = Normalisation.whitening(unit)
+    nodes = np.concatenate([normal.apply(maps) for maps in unit])
+    np.testing.assert_allclose(nodes.mean(axis=0), 0, atol=1e-12)
+    np.testing.assert_allclose(np.cov(nodes.T, bias=True), np.eye(3), atol=1e-10)
+
+
+def test_whitening_does_not_blow_up_what_is_constant():
+    """A projection that is zero, or a copy of another, gives finite small features."""
+    maps = np.random.default_rng(0).normal(size=(200, 1)) * [1, 1, 0]
+    features = Normalisation.whitening([unit_rms(maps)]).apply(maps)
+    assert np.abs(features[:, 1:]).max() < 1e-6
+
+
+def test_deviation_weights_are_those_of_the_paper():
+    """Features are unit-rms projections times the deviation of their index."""
+    maps = np.random.default_rng(0).normal(size=(200, 3)) * [5, 2, 1]
+    expected = unit_rms(maps) * relative_deviations([maps])
+    np.testing.assert_allclose(Normalisation.by_deviation([maps]).apply(maps), expected, rtol=1e-12)
+
+
+def test_whitening_of_constant_maps_is_refused():
+    """Maps that nowhere vary cannot be whitened."""
+    with pytest.raises(ParameterError, match="no projection varies"):
+        Normalisation.whitening([np.ones((5, 2))])

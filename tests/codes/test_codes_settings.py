@@ -12,7 +12,7 @@ from spem.errors import ModelError, ParameterError
 
 def test_settings_survive_json():
     """Settings written as JSON text and read again are equal."""
-    settings = Settings(voxels=None, rho_ranges=((0.1, 0.2), (0.2, 0.4)), centred=True, power=0.5)
+    settings = Settings(voxels=None, rho_ranges=((0.1, 0.2), (0.2, 0.4)), centred=True, power=0.75)
     assert Settings.from_json(json.loads(json.dumps(settings.to_json()))) == settings
 
 
@@ -25,6 +25,7 @@ def test_settings_survive_json():
         ({"rho_ranges": ((0.3, float("inf")),)}, "0 < low < high < inf"),
         ({"rho_ranges": ()}, "empty"),
         ({"boundary": "face"}, "must be one of surface, voxel"),
+        ({"scaling": True}, "must be one of whiten, deviation, none"),
         ({"scheme": "cubic"}, "must be one of linear, squared, log"),
         ({"power": -0.1}, "must lie in"),
     ],

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.base import clone
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
+from spem.codes.normalise import Normalisation
 from spem.codes.vlad import VLAD, encode, vlad
 from spem.errors import ParameterError
 
@@ -37,6 +38,7 @@ def test_vlad_of_nodes_on_their_centres_is_zero():
     assert not vlad(centers, centers).any()
 
 
+@settings(max_examples=20)
 @given(st.integers(0, 1000))
 def test_order_of_nodes_changes_no_code(seed):
     """Permuting the nodes of a shape leaves its code unchanged."""
@@ -47,6 +49,7 @@ def test_order_of_nodes_changes_no_code(seed):
     np.testing.assert_allclose(learner.transform([permuted]), learner.transform(shapes[:1]), atol=1e-6)
 
 
+@settings(max_examples=20)
 @given(st.integers(1, 4), st.floats(1e-3, 1e3))
 def test_voxel_budget_and_unit_change_no_code(copies, unit):
     """More nodes with the same values, or maps in another unit, give the same code."""
@@ -63,12 +66,16 @@ def test_codes_have_unit_length_and_equal_bands():
     np.testing.assert_allclose((codes**2).sum(-1), 1 / 3, rtol=1e-12)
 
 
-def test_scale_false_weighs_all_projections_the_same():
-    """Without deviations every projection has weight one; with them, relative ones."""
+def test_scaling_is_chosen():
+    """Each scaling makes its normalisation: identity, relative deviations, or a full transform."""
     shapes = [(np.float64(maps) * [9, 1, 1],) for (maps,) in collection()]
-    assert VLAD(3, scale=False, random_state=0).fit(shapes).deviations_[0].tolist() == [1, 1, 1]
-    weights = VLAD(3, random_state=0).fit(shapes).deviations_[0]
-    assert weights[0] / weights[1] == pytest.approx(9, rel=0.2)
+    transforms = {
+        scaling: VLAD(3, scaling=scaling, random_state=0).fit(shapes).normalisations_[0].transform
+        for scaling in ("none", "deviation", "whiten")
+    }
+    assert transforms["none"].tolist() == np.eye(3).tolist()
+    assert transforms["deviation"][0, 0] / transforms["deviation"][1, 1] == pytest.approx(9, rel=0.2)
+    assert np.count_nonzero(transforms["whiten"]) == 9
 
 
 def test_one_band_may_come_as_an_array_and_shapes_as_a_generator():
@@ -115,7 +122,9 @@ def test_bad_maps_are_refused(shapes, message):
         VLAD(2).fit(shapes)
 
 
-@pytest.mark.parametrize("bad", [{"power": 1.5}, {"n_centers": 0}, {"nodes_per_shape": 0}, {"n_init": 0}])
+@pytest.mark.parametrize(
+    "bad", [{"power": 1.5}, {"scaling": "z"}, {"n_centers": 0}, {"nodes_per_shape": 0}, {"n_init": 0}]
+)
 def test_bad_parameters_are_refused(bad):
     """Parameters out of their range are named."""
     with pytest.raises(ParameterError, match=next(iter(bad))):
@@ -125,7 +134,7 @@ def test_bad_parameters_are_refused(bad):
 def test_encode_wants_weights_and_centres_for_every_band():
     """A missing band is an error and not a shorter code."""
     with pytest.raises(ValueError, match="shorter"):
-        encode((np.ones((2, 1)), np.ones((2, 1))), (np.ones(1),), (np.ones((1, 1)),))
+        encode((np.ones((2, 1)), np.ones((2, 1))), (Normalisation.none(1),), (np.ones((1, 1)),))
 
 
 # Rows of a two-dimensional array are shapes of one map, and a shape may have any number of nodes.
@@ -134,6 +143,7 @@ EXPECTED = {
     "check_n_features_in_after_fitting": ANY_LENGTH,
     "check_n_features_in": ANY_LENGTH,
     "check_transformer_general": ANY_LENGTH,
+    "check_fit2d_1feature": "a row of one column is a shape of one node, and at unit rms none of them varies",
     "check_estimators_empty_data_messages": "a row without columns is a shape without nodes, refused as such",
 }
 

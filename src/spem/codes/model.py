@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from spem.codes.bands import as_bands
 from spem.codes.container import content_hash, read_container, write_container
+from spem.codes.normalise import Normalisation
 from spem.codes.settings import Settings
 from spem.codes.vlad import VLAD, encode
 from spem.errors import ModelError, ParameterError
@@ -20,34 +21,33 @@ from spem.errors import ModelError, ParameterError
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Settings, deviations and vocabularies.
+    """Settings, normalisations and vocabularies.
 
     Parameters
     ----------
     settings
         How a file becomes a code.
-    deviations
-        For each band ``(n_maps,)`` weights of the projections.
+    normalisations
+        For each band what makes node features of maps.
     centers
         For each band ``(n_centers, n_maps)`` vocabulary.
     """
 
     settings: Settings
-    deviations: tuple[NDArray[np.float64], ...]
+    normalisations: tuple[Normalisation, ...]
     centers: tuple[NDArray[np.float32], ...]
 
     def __post_init__(self) -> None:
         s = self.settings
-        shapes = [weights.shape for weights in self.deviations]
-        shapes += [words.shape for words in self.centers]
-        n_bands = len(s.rho_ranges)
-        if shapes != [(s.n_maps,)] * n_bands + [(s.n_centers, s.n_maps)] * n_bands:
+        shapes = [array.shape for array in self.to_arrays().values()]
+        n_bands, d = len(s.rho_ranges), s.n_maps
+        if shapes != [(d,), (d, d), (s.n_centers, d)] * n_bands:
             msg = f"a model of {n_bands} bands, {s.n_centers} centres and {s.n_maps} maps got arrays {shapes}"
             raise ModelError(msg)
 
     @classmethod
     def fit(cls, settings: Settings, shapes: Iterable[Any]) -> Self:
-        """Learn deviations and vocabularies from the maps of shapes.
+        """Learn normalisations and vocabularies from the maps of shapes.
 
         Parameters
         ----------
@@ -68,11 +68,11 @@ class Model:
             settings.n_centers,
             power=settings.power,
             nodes_per_shape=settings.nodes_per_shape,
-            scale=settings.scale,
+            scaling=settings.scaling,
             random_state=settings.seed,
         ).fit(shapes)
         centers = (words.cluster_centers_.astype(np.float32) for words in learner.vocabularies_)
-        return cls(settings, tuple(learner.deviations_), tuple(centers))
+        return cls(settings, tuple(learner.normalisations_), tuple(centers))
 
     @property
     def n_code(self) -> int:
@@ -105,16 +105,20 @@ class Model:
             When the maps are not finite or not of the model's bands.
         """
         bands = as_bands(maps, name)
-        found, expected = [m.shape[1] for m in bands], [len(weights) for weights in self.deviations]
+        found, expected = [m.shape[1] for m in bands], [words.shape[1] for words in self.centers]
         if found != expected:
             msg = f"{name} has {found} maps in its bands, model {self.digest} expects {expected}"
             raise ParameterError(msg)
-        return encode(bands, self.deviations, self.centers, self.settings.power).astype(np.float32)
+        return encode(bands, self.normalisations, self.centers, self.settings.power).astype(np.float32)
 
     def to_arrays(self, prefix: str = "") -> dict[str, NDArray[Any]]:
         """Return the learnt arrays by name, for a file."""
-        named = {f"{prefix}deviations.{band}": array for band, array in enumerate(self.deviations)}
-        return named | {f"{prefix}centers.{band}": array for band, array in enumerate(self.centers)}
+        arrays: dict[str, NDArray[Any]] = {}
+        for band, (normal, words) in enumerate(zip(self.normalisations, self.centers, strict=True)):
+            arrays[f"{prefix}mean.{band}"] = normal.mean
+            arrays[f"{prefix}transform.{band}"] = normal.transform
+            arrays[f"{prefix}centers.{band}"] = words
+        return arrays
 
     @classmethod
     def from_arrays(
@@ -124,8 +128,11 @@ class Model:
         checked = Settings.from_json(settings, source)
         bands = range(len(checked.rho_ranges))
         try:
-            deviations = tuple(arrays[f"{prefix}deviations.{band}"] for band in bands)
-            return cls(checked, deviations, tuple(arrays[f"{prefix}centers.{band}"] for band in bands))
+            normalisations = tuple(
+                Normalisation(arrays[f"{prefix}mean.{band}"], arrays[f"{prefix}transform.{band}"])
+                for band in bands
+            )
+            return cls(checked, normalisations, tuple(arrays[f"{prefix}centers.{band}"] for band in bands))
         except KeyError as error:
             msg = f"{source}: the model lacks the array {error}; make it again"
             raise ModelError(msg) from error

@@ -1,13 +1,77 @@
-"""The intensities of the projections: one unit for all shapes, one weight for each projection (5.5)."""
+"""From maps to node features: one unit for all shapes, then weights or whitening learnt from nodes (5.5)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError
+
+Scaling = Literal["whiten", "deviation", "none"]
+# Directions in which the nodes vary less than this part of the largest variance are not blown up
+# further: what is left there is the error of the solver.
+_LEAST_VARIANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Normalisation:
+    """An affine map from unit-rms projections to node features, learnt from training nodes.
+
+    Parameters
+    ----------
+    mean
+        ``(n_maps,)`` what is subtracted from the unit-rms projections.
+    transform
+        ``(n_maps, n_maps)`` what the rest is multiplied with.
+
+    Examples
+    --------
+    >>> Normalisation.none(2).apply(np.array([[3.0, 0.0], [3.0, 2.0]])).round(3)
+    array([[1.   , 0.   ],
+           [1.   , 1.414]])
+    """
+
+    mean: NDArray[np.float64]
+    transform: NDArray[np.float64]
+
+    @classmethod
+    def none(cls, n_maps: int) -> Self:
+        """Leave every projection at unit rms."""
+        return cls(np.zeros(n_maps), np.eye(n_maps))
+
+    @classmethod
+    def by_deviation(cls, samples: Sequence[NDArray[np.floating]]) -> Self:
+        """Weight each projection by the deviation of its index, as 5.5 does.
+
+        `samples` holds the projections of training nodes as they are: see `relative_deviations`.
+        """
+        weights = relative_deviations(samples)
+        return cls(np.zeros(weights.size), np.diag(weights))
+
+    @classmethod
+    def whitening(cls, samples: Sequence[NDArray[np.floating]]) -> Self:
+        """Rotate to the principal axes of the training nodes and divide by the deviation along each.
+
+        Projections at unit rms are nearly the same function where the fields are flat; what tells
+        shapes apart is in the axes of little variance, and this lets them count. `samples` holds
+        unit-rms projections of training nodes.
+        """
+        nodes = np.concatenate(samples).astype(np.float64)
+        variance, axes = np.linalg.eigh(np.atleast_2d(np.cov(nodes, rowvar=False, bias=True)))
+        if not variance[-1] > 0:
+            raise ParameterError(_constant(nodes))
+        variance = np.maximum(variance[::-1], _LEAST_VARIANCE * variance[-1])
+        return cls(nodes.mean(axis=0), axes[:, ::-1] / np.sqrt(variance))
+
+    def apply(self, maps: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Return the node features ``(n_nodes, n_maps)`` of one shape, in the precision of its maps."""
+        unit = unit_rms(maps)
+        unit -= self.mean.astype(unit.dtype)
+        return np.asarray(unit @ self.transform.astype(unit.dtype))
 
 
 def unit_rms(maps: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -75,6 +139,10 @@ def relative_deviations(samples: Sequence[NDArray[np.floating]]) -> NDArray[np.f
     deviations = nodes.std(axis=0)
     length = float(np.linalg.norm(deviations))
     if not length > 0:
-        msg = f"no projection varies over the {len(nodes)} training nodes; give shapes with several nodes"
-        raise ParameterError(msg)
+        raise ParameterError(_constant(nodes))
     return np.asarray(deviations / length)
+
+
+def _constant(nodes: NDArray[np.floating]) -> str:
+    """Return the message for training nodes that are all the same."""
+    return f"no projection varies over the {len(nodes)} training nodes; give shapes with several nodes"

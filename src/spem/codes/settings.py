@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from importlib.metadata import version
 from typing import Any, Literal, Self, get_args
 
+from spem.codes.normalise import Scaling
 from spem.errors import ModelError, ParameterError
 
 # Raised whenever the same file would get another code under the same settings.
@@ -16,7 +17,7 @@ CODE_FORMAT = 1
 BoundaryKind = Literal["surface", "voxel"]
 SchemeKind = Literal["linear", "squared", "log"]
 ComponentsKind = Literal["largest", "all"]
-_CHOICES = {"boundary": BoundaryKind, "scheme": SchemeKind, "components": ComponentsKind}
+_CHOICES = {"boundary": BoundaryKind, "scheme": SchemeKind, "components": ComponentsKind, "scaling": Scaling}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +53,8 @@ class Settings:
         Number of centres of each band's vocabulary.
     power
         Exponent α of (5.3).
-    scale
-        Whether projections are weighted by their learnt deviations.
+    scaling
+        How the intensities of the projections are made comparable: see `Normalisation`.
     nodes_per_shape
         Number of nodes drawn from each shape for training.
     seed
@@ -77,13 +78,13 @@ class Settings:
     rho_ranges: tuple[tuple[float, float], ...] = ((0.0255, 0.255),)
     scheme: SchemeKind = "linear"
     n_rho: int = 64
-    n_maps: int = 6
+    n_maps: int = 8
     centred: bool = False
     drop_boundary: bool = False
-    n_centers: int = 32
-    power: float = 0.25
-    scale: bool = True
-    nodes_per_shape: int = 2000
+    n_centers: int = 64
+    power: float = 0.5
+    scaling: Scaling = "whiten"
+    nodes_per_shape: int = 500
     seed: int = 0
     code_format: int = CODE_FORMAT
     spem_version: str = version("spem")
@@ -112,6 +113,29 @@ class Settings:
         if not 0 <= self.power <= 1:
             msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"
             raise ParameterError(msg)
+
+    @classmethod
+    def paper(cls, **changes: Any) -> Self:
+        """Return the settings of 5.5: 250 000 voxels, v = 1 on voxels, six maps, 32 words.
+
+        `changes` replace single ones. ρ runs from 1.6 to 16 voxels; the paper does not say.
+
+        Examples
+        --------
+        >>> Settings.paper(voxels=15_000).n_centers
+        32
+        """
+        chosen: dict[str, Any] = {
+            "voxels": 250_000,
+            "boundary": "voxel",
+            "rho_ranges": ((0.0254, 0.254),),
+            "n_maps": 6,
+            "drop_boundary": True,
+            "n_centers": 32,
+            "power": 0.25,
+            "scaling": "deviation",
+        }
+        return cls(**(chosen | changes))
 
     def to_json(self) -> dict[str, Any]:
         """Return the settings as plain values that `json` can write."""
