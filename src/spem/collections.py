@@ -1,0 +1,186 @@
+"""The facade of collections: codes of files, ranked answers, scores."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from spem.codes.codes import Codes
+from spem.codes.collection import encode_collection, encode_file
+from spem.codes.model import Model
+from spem.codes.settings import Settings
+from spem.codes.sources import as_source, find_files, source_hash
+from spem.errors import LabelError, ParameterError, ReadError
+from spem.retrieval.distances import correlation_distance
+from spem.retrieval.evaluation import Scores
+from spem.retrieval.evaluation import evaluate as evaluate_distances
+from spem.retrieval.labels import match_labels, read_labels
+from spem.retrieval.ranking import Answer, rank
+from spem.shapes.shape import Shape
+
+
+def encode(
+    sources: str | Path | Shape | Sequence[str | Path | Shape],
+    *,
+    settings: Settings | None = None,
+    model: Model | None = None,
+    n_jobs: int = 1,
+    work: str | Path | None = None,
+    **options: Any,
+) -> Codes:
+    """Make the codes of a collection: fields, maps, a vocabulary, VLAD (5.5).
+
+    Parameters
+    ----------
+    sources
+        Files, folders, patterns, shapes, or one of them.
+    settings
+        How a shape becomes a code.
+    model
+        The model of other codes, whose vocabulary and settings are used.
+    n_jobs
+        Number of processes.
+    work
+        Folder from which an interrupted call goes on; see `spem.codes.collection`.
+    **options
+        Settings by name, in place of `settings`.
+
+    Returns
+    -------
+    Codes
+        One row a shape; files that gave none are its ``failures``.
+
+    Raises
+    ------
+    ReadError
+        When no source gave a shape.
+    ParameterError
+        When a setting is out of its range, or unknown.
+
+    Examples
+    --------
+    >>> import spem
+    >>> shapes = [spem.synthetic.disk(radius=r, spacing=1.0) for r in (8.0, 9.0)]
+    >>> len(spem.encode(shapes, voxels=None, n_centers=8))
+    2
+    """
+    if options and (settings is not None or model is not None):
+        msg = f"{', '.join(options)}: a model or settings were given too; give one or the other"
+        raise ParameterError(msg)
+    try:
+        chosen = Settings(**options) if options else settings
+    except TypeError as error:
+        msg = f"{', '.join(options)}: not all are settings of a code ({error})"
+        raise ParameterError(msg) from error
+    given = [sources] if isinstance(sources, (str, Path, Shape)) else list(sources)
+    listed: list[str | Path | Shape] = []
+    for source in given:
+        listed.extend([source] if isinstance(source, Shape) else find_files([source]))
+    return encode_collection(listed, chosen, model=model, n_jobs=n_jobs, work=work)
+
+
+def search(codes: Codes | str | Path, query: str | Path | Shape, k: int | None = 10) -> list[Answer]:
+    """Rank the shapes of a collection by their distance to a query.
+
+    Parameters
+    ----------
+    codes
+        Codes, or the file that holds them.
+    query
+        A file or a shape, coded with the model of the codes unless it is one of the collection;
+        or the name or path of a shape of the collection.
+    k
+        Number of answers; all with None.
+
+    Returns
+    -------
+    list of Answer
+        Nearest first; a query of the collection finds itself.
+
+    Raises
+    ------
+    SpemError
+        When the codes or the query cannot be read.
+
+    Examples
+    --------
+    >>> import spem
+    >>> shapes = [spem.synthetic.disk(radius=8.0, spacing=1.0), spem.synthetic.star_polygon(5, 2)]
+    >>> codes = spem.encode(shapes, voxels=None, n_centers=8)
+    >>> spem.search(codes, shapes[0])[0].name
+    'disk'
+    """
+    collection = codes if isinstance(codes, Codes) else Codes.load(codes)
+    row = _row(collection, query)
+    vector = encode_file(query, collection.model) if row is None else collection.vectors[row]
+    return rank(vector, collection, k)
+
+
+def evaluate(
+    codes: Codes | str | Path, labels: str | Path | Mapping[str, str] | Sequence[Hashable]
+) -> Scores:
+    """Score a collection: each shape is a query in turn, those of its class are to be found.
+
+    Parameters
+    ----------
+    codes
+        Codes, or the file that holds them.
+    labels
+        A labels file, a mapping of files to labels, or one label for each row of the codes.
+
+    Raises
+    ------
+    LabelError
+        When a shape has no label, or no class has two shapes.
+
+    Examples
+    --------
+    >>> import spem
+    >>> shapes = [spem.synthetic.disk(radius=r, spacing=1.0) for r in (8.0, 9.0, 10.0)]
+    >>> codes = spem.encode(shapes, voxels=None, n_centers=8)
+    >>> spem.evaluate(codes, ["disk", "disk", "disk"]).mean()["NN"]
+    100.0
+    """
+    collection = codes if isinstance(codes, Codes) else Codes.load(codes)
+    if isinstance(labels, (str, Path)):
+        labels = read_labels(labels)
+    classes = match_labels(row_keys(collection), labels) if isinstance(labels, Mapping) else list(labels)
+    if len(classes) != len(collection):
+        msg = f"{len(classes)} labels for {len(collection)} shapes; give one for each row of the codes"
+        raise LabelError(msg)
+    return evaluate_distances(correlation_distance(collection.vectors, collection.vectors), classes)
+
+
+def row_keys(codes: Codes) -> list[str]:
+    """Return what labels are looked up by: the path of each shape, its name where a file holds several.
+
+    Examples
+    --------
+    >>> import spem
+    >>> row_keys(spem.encode(spem.synthetic.disk(radius=8.0, spacing=1.0), voxels=None, n_centers=8))
+    ['disk']
+    """
+    held: dict[str, set[str]] = {}
+    for name, path in zip(codes.names, codes.paths, strict=True):
+        held.setdefault(path, set()).add(name)
+    return [
+        path if len(held[path]) == 1 else name for name, path in zip(codes.names, codes.paths, strict=True)
+    ]
+
+
+def _row(codes: Codes, query: str | Path | Shape) -> int | None:
+    """Find a query among the shapes of the codes: by content, or by path or name where it is no file."""
+    source = as_source(query)
+    if isinstance(source, Path) and not source.is_file():
+        pairs = zip(codes.names, codes.paths, strict=True)
+        rows = [i for i, pair in enumerate(pairs) if str(query) in pair]
+        if len(rows) == 1:
+            return rows[0]
+        reason = f"{len(rows)} shapes of the codes have that name" if rows else "no such file or coded shape"
+        msg = f"{query}: {reason}; give a file, or the name of one shape of the codes"
+        raise ReadError(msg)
+    key = source_hash(source)
+    rows = [i for i, known in enumerate(codes.hashes) if known == key]
+    single = len({codes.names[i] for i in rows if codes.paths[i] == codes.paths[rows[0]]}) == 1
+    return rows[0] if rows and single else None
