@@ -125,6 +125,18 @@ def test_sweep_agrees_with_the_direct_solver(mask, rho, boundary):
     assert error.max() <= 1e-6
 
 
+def test_threads_and_slabs_change_nothing():
+    """A shape of many slabs has the same field, bit by bit, on any number of threads; and the right one."""
+    mask = np.hypot(*np.indices((400, 360)) - 180) % 60 < 50
+    system = assemble(Shape.from_mask(mask))
+    assert system.n_nodes > 100_000
+    rho = np.array([3.0, 20.0])
+    one, two, many = (Sweep(threads=count).solve(system, rho).values for count in (1, 2, 5))
+    assert np.array_equal(one, two)
+    assert np.array_equal(one, many)
+    assert np.abs(one - Direct().solve(system, rho).values).max() < 1e-6
+
+
 def test_direct_solution_is_right_in_every_entry():
     """A value of 1e-60 deep inside is right to 1e-10 of itself, against 80-digit arithmetic."""
     length, rho = 121, mpf("0.4")

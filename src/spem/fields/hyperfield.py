@@ -71,9 +71,8 @@ class Hyperfield:
         wanted = self.rho if rho is None else self._check(rho)
         a = np.zeros((self.rank + 1, wanted.size))
         a[0] = 1.0
-        for j in np.flatnonzero(np.isfinite(wanted)):
-            s = wanted[j] ** -2.0
-            a[:, j] -= np.linalg.solve(self.stiffness + s * self.mass, s * self.mass[0])
+        finite = np.isfinite(wanted)
+        a[:, finite] -= galerkin(self.stiffness, self.mass, wanted[finite] ** -2.0)
         return a
 
     def fields(self) -> NDArray[np.floating[Any]]:
@@ -151,3 +150,11 @@ class Hyperfield:
         span = f"{self.rho.min():.4g} to {self.rho.max():.4g}"
         sizes = f"{self.shape.n_nodes} nodes, {self.rho.size} rho {span}, rank {self.rank}"
         return f"Hyperfield({self.shape.name!r}, {sizes})"
+
+
+def galerkin(
+    stiffness: NDArray[np.float64], mass: NDArray[np.float64], shifts: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Solve (K + s M) y = s M e, e the constant, for each s: deficits 1 - v in a basis, one column each."""
+    s = shifts[:, None, None]
+    return np.asarray(np.linalg.solve(stiffness + s * mass, s * mass[:, :1])[..., 0].T)

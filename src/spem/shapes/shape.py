@@ -212,8 +212,8 @@ class Shape:
     def volume(self) -> float:
         """Length, area, volume ... of the shape, in units of the spacing, with the surface where it is cut.
 
-        Along one axis, a node owns half of each uncut edge and its part of each cut one. Axes are weighted by
-        the square of their number of cuts: the more lines meet the surface, the better they measure the volume.
+        Along one axis, a node owns half of each uncut edge and its part of each cut one. Axes are weighted
+        by the square of their number of cuts: the more lines meet the surface, the better they measure.
         """
         axis = self.cuts.direction // 2
         count = np.bincount(axis, minlength=self.ndim).astype(np.float64)

@@ -2,7 +2,12 @@
 
 A level is a graph in C order with, per node, neighbours in 2d directions (a dummy row of zeros stands for a
 missing one), a Laplacian diagonal and a mass; lane l of node i has the diagonal ``diagonal[i] + shift[l] *
-mass[i]``. `weight` has one row for all nodes (finest level, `step` 0) or one row per node (`step` 1).
+mass[i]``. `weight` and `mass` have one row for all nodes (finest level, `step` 0) or one per node (`step` 1).
+
+Nodes are cut along the first axis into slabs, even and odd ones in turn; ``slabs[k]`` is the first node of
+slab k. A kernel does the slabs `first`, ``first + stride``, ... . Sweeps do all even slabs, then all odd ones,
+and back in reverse: slabs of one colour never touch, so threads share them and the answer does not depend on
+how many there are.
 """
 
 from __future__ import annotations
@@ -17,96 +22,125 @@ from spem.fields.solvers.lanes import LANES, add, div, load, mul, splat, store, 
 
 Lanes = NDArray[np.float32]
 Table = NDArray[np.int32]
+Slabs = NDArray[np.int64]
+Partial = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
-def multiply(p: Lanes, q: Lanes, level: Any, shift: Lanes) -> NDArray[np.float64]:
-    """Write q = (A + shift) p and return the dot products of p and q, lane by lane."""
-    neighbours, weight, step, diagonal, mass = level
-    s = load(shift, 0)
-    total = np.zeros((1, LANES))
-    dot = load(total, 0)
-    for i in range(neighbours.shape[0]):
-        here = load(p, i)
-        value = mul(add(splat(diagonal[i]), mul(s, splat(mass[i * step]))), here)
-        for k in range(neighbours.shape[1]):
-            value = sub(value, mul(splat(weight[i * step, k]), load(p, neighbours[i, k])))
-        store(q, i, value)
-        dot = add(dot, mul(widen(here), widen(value)))
-    store(total, 0, dot)
-    return total
-
-
-@njit(cache=True, nogil=True)
-def advance_and_relax(
-    x: Lanes, r: Lanes, p: Lanes, q: Lanes, z: Lanes, alpha: Lanes, level: Any, shift: Lanes
+def multiply(
+    p: Lanes, q: Lanes, partial: Partial, level: Any, shift: Lanes, slabs: Slabs, first: int, stride: int
 ) -> None:
-    """Add alpha p to x, subtract alpha q from r, then do one forward Gauss-Seidel sweep for z from zero."""
-    neighbours, weight, step, diagonal, mass = level
-    s, a = load(shift, 0), load(alpha, 0)
-    for i in range(neighbours.shape[0]):
-        store(x, i, add(load(x, i), mul(a, load(p, i))))
-        value = sub(load(r, i), mul(a, load(q, i)))
-        store(r, i, value)
-        for k in range(0, neighbours.shape[1], 2):
-            value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
-        store(z, i, div(value, add(splat(diagonal[i]), mul(s, splat(mass[i * step])))))
-
-
-@njit(cache=True, nogil=True)
-def relax_forward(r: Lanes, z: Lanes, level: Any, shift: Lanes) -> None:
-    """One forward Gauss-Seidel sweep for z from zero: only lower neighbours have a value yet."""
+    """Write q = (A + shift) p, and the dot products of p and q for each slab."""
     neighbours, weight, step, diagonal, mass = level
     s = load(shift, 0)
-    for i in range(neighbours.shape[0]):
-        value = load(r, i)
-        for k in range(0, neighbours.shape[1], 2):
-            value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
-        store(z, i, div(value, add(splat(diagonal[i]), mul(s, splat(mass[i * step])))))
+    for slab in range(first, slabs.size - 1, stride):
+        partial[slab] = 0
+        dot = load(partial, slab)
+        for i in range(slabs[slab], slabs[slab + 1]):
+            here = load(p, i)
+            value = mul(add(splat(diagonal[i]), mul(s, splat(mass[i * step]))), here)
+            for k in range(neighbours.shape[1]):
+                value = sub(value, mul(splat(weight[i * step, k]), load(p, neighbours[i, k])))
+            store(q, i, value)
+            dot = add(dot, mul(widen(here), widen(value)))
+        store(partial, slab, dot)
 
 
 @njit(cache=True, nogil=True)
-def restrict(z: Lanes, coarse: Lanes, aggregate: Table, level: Any) -> None:
-    """Sum the residual over aggregates; after a forward sweep from zero it is the upper neighbours' part."""
+def advance(
+    x: Lanes, r: Lanes, p: Lanes, q: Lanes, alpha: Lanes, slabs: Slabs, first: int, stride: int
+) -> None:
+    """Add alpha p to x and subtract alpha q from r."""
+    a = load(alpha, 0)
+    for slab in range(first, slabs.size - 1, stride):
+        for i in range(slabs[slab], slabs[slab + 1]):
+            store(x, i, add(load(x, i), mul(a, load(p, i))))
+            store(r, i, sub(load(r, i), mul(a, load(q, i))))
+
+
+@njit(cache=True, nogil=True)
+def relax_forward(
+    r: Lanes, z: Lanes, level: Any, shift: Lanes, slabs: Slabs, first: int, stride: int
+) -> None:
+    """Do the slabs' part of a Gauss-Seidel sweep for z from zero: only nodes done before have a value.
+
+    Those are the lower neighbours and, for odd slabs, the even slab above; z is zero where nothing is done.
+    """
+    neighbours, weight, step, diagonal, mass = level
+    s = load(shift, 0)
+    for slab in range(first, slabs.size - 1, stride):
+        high = slabs[slab + 1]
+        later = high if slab % 2 == 1 else neighbours.shape[0] + 1
+        for i in range(slabs[slab], high):
+            value = load(r, i)
+            for k in range(0, neighbours.shape[1], 2):
+                value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
+            if neighbours[i, 1] >= later:
+                value = add(value, mul(splat(weight[i * step, 1]), load(z, neighbours[i, 1])))
+            store(z, i, div(value, add(splat(diagonal[i]), mul(s, splat(mass[i * step])))))
+
+
+@njit(cache=True, nogil=True)
+def restrict(
+    z: Lanes, coarse: Lanes, aggregate: Table, level: Any, slabs: Slabs, first: int, stride: int
+) -> None:
+    """Sum the residual over aggregates: after a forward sweep it is what later nodes contribute.
+
+    Slabs hold whole aggregates, and the rows of `coarse` are zero before.
+    """
     neighbours, weight, step, _, _ = level
-    coarse[:] = 0
-    for i in range(neighbours.shape[0]):
-        value = load(coarse, aggregate[i])
-        for k in range(1, neighbours.shape[1], 2):
-            value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
-        store(coarse, aggregate[i], value)
+    for slab in range(first, slabs.size - 1, stride):
+        low, high = slabs[slab], slabs[slab + 1]
+        earlier = low if slab % 2 == 0 else 0
+        later = high if slab % 2 == 1 else neighbours.shape[0]
+        for i in range(low, high):
+            value = load(coarse, aggregate[i])
+            for k in range(3, neighbours.shape[1], 2):
+                value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
+            below, above = neighbours[i, 0], neighbours[i, 1]
+            if above < later:
+                value = add(value, mul(splat(weight[i * step, 1]), load(z, above)))
+            if below < earlier:
+                value = add(value, mul(splat(weight[i * step, 0]), load(z, below)))
+            store(coarse, aggregate[i], value)
 
 
 @njit(cache=True, nogil=True)
-def correct_and_relax(
-    r: Lanes, z: Lanes, coarse: Lanes, aggregate: Table, level: Any, shift: Lanes
-) -> NDArray[np.float64]:
-    """Add the coarse correction, sweep backward, and return the dot products of r and z, lane by lane."""
+def correct(z: Lanes, coarse: Lanes, aggregate: Table, slabs: Slabs, first: int, stride: int) -> None:
+    """Add the correction of the coarser level."""
+    for slab in range(first, slabs.size - 1, stride):
+        for i in range(slabs[slab], slabs[slab + 1]):
+            store(z, i, add(load(z, i), load(coarse, aggregate[i])))
+
+
+@njit(cache=True, nogil=True)
+def relax_backward(
+    r: Lanes, z: Lanes, partial: Partial, level: Any, shift: Lanes, slabs: Slabs, first: int, stride: int
+) -> None:
+    """Do the slabs' part of a reverse Gauss-Seidel sweep, and the dot products of r and z for each slab."""
     neighbours, weight, step, diagonal, mass = level
     s = load(shift, 0)
-    total = np.zeros((1, LANES))
-    dot = load(total, 0)
-    n = neighbours.shape[0]
-    for i in range(n):
-        store(z, i, add(load(z, i), load(coarse, aggregate[i])))
-    for i in range(n - 1, -1, -1):
-        source = load(r, i)
-        value = source
-        for k in range(neighbours.shape[1]):
-            value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
-        value = div(value, add(splat(diagonal[i]), mul(s, splat(mass[i * step]))))
-        store(z, i, value)
-        dot = add(dot, mul(widen(source), widen(value)))
-    store(total, 0, dot)
-    return total
+    for slab in range(first, slabs.size - 1, stride):
+        partial[slab] = 0
+        dot = load(partial, slab)
+        for i in range(slabs[slab + 1] - 1, slabs[slab] - 1, -1):
+            source = load(r, i)
+            value = source
+            for k in range(neighbours.shape[1]):
+                value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
+            value = div(value, add(splat(diagonal[i]), mul(s, splat(mass[i * step]))))
+            store(z, i, value)
+            dot = add(dot, mul(widen(source), widen(value)))
+        store(partial, slab, dot)
 
 
 @njit(cache=True, nogil=True)
-def turn(z: Lanes, p: Lanes, beta: Lanes, n: int) -> None:
+def turn(z: Lanes, p: Lanes, beta: Lanes, slabs: Slabs, first: int, stride: int) -> None:
     """Make p = z + beta p, the next search directions."""
     b = load(beta, 0)
-    for i in range(n):
-        store(p, i, add(load(z, i), mul(b, load(p, i))))
+    for slab in range(first, slabs.size - 1, stride):
+        for i in range(slabs[slab], slabs[slab + 1]):
+            store(p, i, add(load(z, i), mul(b, load(p, i))))
 
 
 @njit(cache=True, nogil=True)
@@ -121,13 +155,13 @@ def apply_dense(r: Lanes, z: Lanes, inverse: Lanes) -> None:
 
 
 @njit(cache=True, nogil=True)
-def peak(z: Lanes, n: int) -> NDArray[np.float64]:
-    """Largest magnitude in each lane."""
-    largest = np.zeros(LANES)
-    for i in range(n):
-        for lane in range(LANES):
-            largest[lane] = max(largest[lane], abs(z[i, lane]))
-    return largest
+def peak(z: Lanes, partial: Partial, slabs: Slabs, first: int, stride: int) -> None:
+    """Largest magnitude in each lane, for each slab."""
+    for slab in range(first, slabs.size - 1, stride):
+        partial[slab] = 0
+        for i in range(slabs[slab], slabs[slab + 1]):
+            for lane in range(LANES):
+                partial[slab, lane] = max(partial[slab, lane], abs(z[i, lane]))
 
 
 @njit(cache=True, nogil=True)

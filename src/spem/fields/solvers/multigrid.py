@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from spem.fields.operator import System
 from spem.fields.solvers import kernels
 from spem.fields.solvers.lanes import LANES
+from spem.fields.solvers.team import Team, cut_slabs
 
 # The coarsest level is inverted densely, lane by lane.
 COARSEST = 48
@@ -27,6 +28,7 @@ class Level:
 
     graph: tuple[Any, ...]  # neighbours, weight, step, diagonal, mass: what the kernels take
     aggregate: NDArray[np.int32] | None  # (n,) node of the next level, None on the coarsest
+    slabs: NDArray[np.int64]  # first node of each slab, and n
 
     @property
     def n_nodes(self) -> int:
@@ -59,11 +61,11 @@ class Hierarchy:
             blocks, aggregate = kernels.aggregate_voxels(voxels, shape, coarse_shape)
             if blocks.size == voxels.size:
                 break
-            levels.append(Level(graph, aggregate))
+            levels.append(Level(graph, aggregate, cut_slabs(voxels, tuple(shape))))
             table, weight, diagonal, mass = kernels.coarsen(aggregate, blocks.size, graph)
             graph = (table, weight, 1, diagonal, mass)
             voxels, shape = blocks, coarse_shape
-        levels.append(Level(graph, None))
+        levels.append(Level(graph, None, np.array([0, graph[0].shape[0]])))
         return cls(tuple(levels), unit)
 
 
@@ -78,36 +80,43 @@ class Cycle:
         ``(LANES,)`` shifts in units of the hierarchy.
     z
         ``(n_nodes + 1, LANES)`` array that takes the answers.
+    team
+        Threads.
     """
 
-    def __init__(self, hierarchy: Hierarchy, shifts: NDArray[np.float64], z: NDArray[np.float32]) -> None:
+    def __init__(
+        self, hierarchy: Hierarchy, shifts: NDArray[np.float64], z: NDArray[np.float32], team: Team
+    ) -> None:
         self.levels = hierarchy.levels
+        self.team = team
         self.shift = shifts.astype(np.float32)[None]
         self.r = [rows(level.n_nodes) for level in self.levels[1:]]
         self.z = [z, *(rows(level.n_nodes) for level in self.levels[1:])]
         self._inverse = _invert(self.levels[-1], shifts)
 
-    def finish(self, r: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Complete the cycle whose forward sweep on the finest level is done; return r·z by lane."""
-        if len(self.levels) == 1:
-            kernels.apply_dense(r, self.z[0], self._inverse)
-            return np.asarray(np.einsum("il,il->l", r, self.z[0], dtype=np.float64))[None]
+    def apply(self, r: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Write the cycle's answer to r into ``self.z[0]`` and return r·z, ``(1, LANES)``."""
         return self._descend(0, r)
 
-    def apply(self, r: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Write the cycle's answer to r into ``self.z[0]`` and return r·z by lane."""
-        kernels.relax_forward(r, self.z[0], self.levels[0].graph, self.shift)
-        return self.finish(r)
-
     def _descend(self, depth: int, r: NDArray[np.float32]) -> NDArray[np.float64]:
-        level, z, coarse_r, coarse_z = self.levels[depth], self.z[depth], self.r[depth], self.z[depth + 1]
-        kernels.restrict(z, coarse_r, level.aggregate, level.graph)
-        if depth + 2 == len(self.levels):
-            kernels.apply_dense(coarse_r, coarse_z, self._inverse)
-        else:
-            kernels.relax_forward(coarse_r, coarse_z, self.levels[depth + 1].graph, self.shift)
-            self._descend(depth + 1, coarse_r)
-        return kernels.correct_and_relax(r, z, coarse_z, level.aggregate, level.graph, self.shift)  # type: ignore[no-any-return]
+        level, z, team = self.levels[depth], self.z[depth], self.team
+        if level.aggregate is None:
+            kernels.apply_dense(r, z, self._inverse)
+            return np.asarray(np.einsum("il,il->l", r, z, dtype=np.float64))[None]
+        if level.slabs.size > 2:
+            z[:] = 0
+        graph, shift, slabs = level.graph, self.shift, level.slabs
+        team.even(kernels.relax_forward, slabs, r, z, graph, shift)
+        team.odd(kernels.relax_forward, slabs, r, z, graph, shift)
+        coarse_r, coarse_z = self.r[depth], self.z[depth + 1]
+        coarse_r[:] = 0
+        team.all(kernels.restrict, slabs, z, coarse_r, level.aggregate, graph)
+        self._descend(depth + 1, coarse_r)
+        team.all(kernels.correct, slabs, z, coarse_z, level.aggregate)
+        partial = np.empty((slabs.size - 1, LANES))
+        team.odd(kernels.relax_backward, slabs, r, z, partial, graph, shift)
+        team.even(kernels.relax_backward, slabs, r, z, partial, graph, shift)
+        return np.asarray(partial.sum(axis=0, keepdims=True))
 
 
 def rows(n: int) -> NDArray[np.float32]:

@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spem.fields.hyperfield import galerkin
 from spem.fields.operator import System
 from spem.fields.solvers import reduced_kernels as kernels
 from spem.fields.solvers.lanes import LANES
+from spem.fields.solvers.team import Slabs, Team
 
 # Directions of a new block below this fraction of its largest are rounding noise of single precision.
 _DEPENDENT = 1e-13
@@ -33,9 +35,16 @@ class ReducedBasis:
         Length that lengths are measured in, for scaling.
     dtype
         Precision that the columns are stored in.
+    slabs
+        First node of each slab, and the number of nodes.
+    team
+        Threads.
     """
 
-    def __init__(self, system: System, unit: float, dtype: type[np.floating[Any]]) -> None:
+    def __init__(
+        self, system: System, unit: float, dtype: type[np.floating[Any]], slabs: Slabs, team: Team
+    ) -> None:
+        self.slabs, self.team = slabs, team
         self.n_nodes = system.n_nodes
         self.dtype = dtype
         self.blocks: list[NDArray[Any]] = []
@@ -50,9 +59,7 @@ class ReducedBasis:
         y = np.zeros((self.mass.shape[0], shifts.size))
         used = np.diag(self.mass) > 0
         stiffness, mass = self.stiffness[np.ix_(used, used)], self.mass[np.ix_(used, used)]
-        c = mass[0]
-        for j, s in enumerate(shifts):
-            y[used, j] = np.linalg.solve(stiffness + s * mass, s * c)
+        y[used] = galerkin(stiffness, mass, shifts)
         return y
 
     def combine(self, y: Small, out: NDArray[Any]) -> None:
@@ -61,16 +68,18 @@ class ReducedBasis:
             out[: self.n_nodes] = y[0]
         for k, block in enumerate(self.blocks):
             mix = np.ascontiguousarray(y[1 + k * LANES : 1 + (k + 1) * LANES])
-            kernels.combine(block, mix, np.ascontiguousarray(y[:1]), out, k > 0)
+            constant = np.ascontiguousarray(y[:1])
+            self.team.all(kernels.combine, self.slabs, block, mix, constant, out, k > 0)
 
     def residual(self, u: NDArray[np.float64], r: NDArray[np.float32], shifts: Small) -> None:
         """Write s·1 - (A + s) u to r, computed in double precision."""
-        kernels.true_residual(u, r, self.neighbours, self.weights, self.diagonal, shifts[None])
+        graph = self.neighbours, self.weights, self.diagonal
+        self.team.all(kernels.true_residual, self.slabs, u, r, *graph, shifts[None])
 
     def extend(self, vectors: NDArray[np.float32]) -> None:
         """Orthonormalise a block of `LANES` vectors against the basis and append it."""
-        gram = kernels.cross(vectors, vectors)
-        inner = [gram[LANES:]] + [kernels.cross(block, vectors)[:LANES] for block in self.blocks]
+        gram = self._cross(vectors, vectors)
+        inner = [gram[LANES:]] + [self._cross(block, vectors)[:LANES] for block in self.blocks]
         inside = np.concatenate(inner)
         scale = np.sqrt(np.diag(gram[:LANES]))
         scale = np.divide(1.0, scale, out=np.zeros(LANES), where=scale > 0)
@@ -84,11 +93,11 @@ class ReducedBasis:
         mix[:, keep] = scale[:, None] * direction[:, keep] / np.sqrt(size[keep])
         remove = -project @ mix
         block = np.zeros((self.n_nodes + 1, LANES), self.dtype)
-        kernels.combine(vectors, mix, np.ascontiguousarray(remove[:1]), block, False)
+        combine, constant = kernels.combine, np.ascontiguousarray(remove[:1])
+        self.team.all(combine, self.slabs, vectors, mix, constant, block, False)
         for k, old in enumerate(self.blocks):
-            kernels.combine(
-                old, np.ascontiguousarray(remove[1 + k * LANES :][:LANES]), remove[:1], block, True
-            )
+            part = np.ascontiguousarray(remove[1 + k * LANES :][:LANES])
+            self.team.all(combine, self.slabs, old, part, constant, block, True)
         self._append(block)
 
     def compress(self, shifts: Small, tolerance: float) -> tuple[NDArray[Any], Small, Small]:
@@ -118,10 +127,20 @@ class ReducedBasis:
 
     def _append(self, block: NDArray[Any]) -> None:
         self.blocks.append(block)
-        self.mass = _border(self.mass, [kernels.cross(old, block) for old in self.blocks])
-        graph = self.neighbours, self.weights, self.diagonal
-        products = [kernels.cross_operator(old, block, *graph) for old in self.blocks]
+        self.mass = _border(self.mass, [self._cross(old, block) for old in self.blocks])
+        products = [self._cross_operator(old, block) for old in self.blocks]
         self.stiffness = _border(self.stiffness, products)
+
+    def _cross(self, block: NDArray[Any], other: NDArray[Any]) -> Small:
+        partial = np.empty((self.slabs.size - 1, LANES + 1, LANES))
+        self.team.all(kernels.cross, self.slabs, block, other, partial)
+        return np.asarray(partial.sum(axis=0))
+
+    def _cross_operator(self, block: NDArray[Any], other: NDArray[Any]) -> Small:
+        partial = np.empty((self.slabs.size - 1, LANES + 1, LANES))
+        graph = self.neighbours, self.weights, self.diagonal
+        self.team.all(kernels.cross_operator, self.slabs, block, other, partial, *graph)
+        return np.asarray(partial.sum(axis=0))
 
 
 def _border(matrix: Small, products: list[Small]) -> Small:

@@ -22,6 +22,7 @@ from spem.fields.solvers.lanes import LANES
 from spem.fields.solvers.multigrid import Cycle, Hierarchy, rows
 from spem.fields.solvers.protocol import Solution
 from spem.fields.solvers.reduced import ReducedBasis
+from spem.fields.solvers.team import Team
 
 # Poles of the first block, as fractions of the logarithmic range of the shifts: Chebyshev nodes stretched
 # to the largest shift, where the fields vary fastest. Least worst error over hands, combs and balls.
@@ -48,6 +49,8 @@ class Sweep:
         Limit on the blocks of eight poles.
     max_iterations
         Limit on the iterations for each block.
+    threads
+        Threads for large shapes; as many as the process may use when None. Results do not depend on it.
 
     Examples
     --------
@@ -64,6 +67,7 @@ class Sweep:
     rtol: float = 1e-6
     max_blocks: int = 12
     max_iterations: int = 100
+    threads: int | None = None
 
     def solve(self, system: System, rho: NDArray[np.float64]) -> Solution:
         """Solve for each ρ; the residual is the largest entry of the preconditioned true residual."""
@@ -83,9 +87,15 @@ class Sweep:
         return field
 
     def _run(self, system: System, rho: NDArray[np.float64]) -> tuple[Hyperfield, float, int, bool]:
+        with Team(self.threads) as team:
+            return self._sweep(system, rho, team)
+
+    def _sweep(
+        self, system: System, rho: NDArray[np.float64], team: Team
+    ) -> tuple[Hyperfield, float, int, bool]:
         hierarchy = Hierarchy.of(system)
         dtype = np.float32 if self.rtol > _SINGLE_STORAGE else np.float64
-        basis = ReducedBasis(system, hierarchy.unit, dtype)
+        basis = ReducedBasis(system, hierarchy.unit, dtype, hierarchy.levels[0].slabs, team)
         targets = np.square(hierarchy.unit / rho[np.isfinite(rho)])
         block = _Block(hierarchy, basis, self)
         poles: list[float] = []
@@ -112,6 +122,8 @@ class _Block:
     def __init__(self, hierarchy: Hierarchy, basis: ReducedBasis, options: Sweep) -> None:
         n = basis.n_nodes
         self.hierarchy, self.basis, self.options = hierarchy, basis, options
+        self.team, self.slabs = basis.team, basis.slabs
+        self.partial = np.zeros((self.slabs.size - 1, LANES))
         self.x, self.r, self.z = rows(n), rows(n), rows(n)
         # The prediction and the search directions are never needed at the same time.
         self.u = np.zeros((n + 1, LANES))
@@ -125,9 +137,10 @@ class _Block:
         self.u[-1] = 0
         self.basis.combine(self.basis.solve(shifts), self.u)
         self.basis.residual(self.u, self.r, shifts)
-        self.cycle = Cycle(self.hierarchy, shifts, self.z)
+        self.cycle = Cycle(self.hierarchy, shifts, self.z, self.team)
         self.product = self.cycle.apply(self.r)
-        self.error = kernels.peak(self.z, self.basis.n_nodes)
+        self.team.all(kernels.peak, self.slabs, self.z, self.partial)
+        self.error = self.partial.max(axis=0)
         return float(self.error.max())
 
     def solve(self) -> NDArray[np.float32]:
@@ -139,13 +152,14 @@ class _Block:
         start = rz = self.product
         goal = np.maximum(_MARGIN * self.options.rtol, _SINGLE_LIMIT * self.error)
         for _ in range(self.options.max_iterations):
-            alpha = _ratio(rz, kernels.multiply(p, q, graph, shift))
-            kernels.advance_and_relax(x, r, p, q, z, alpha, graph, shift)
-            new = self.cycle.finish(r)
+            self.team.all(kernels.multiply, self.slabs, p, q, self.partial, graph, shift)
+            alpha = _ratio(rz, self.partial.sum(axis=0, keepdims=True))
+            self.team.all(kernels.advance, self.slabs, x, r, p, q, alpha)
+            new = self.cycle.apply(r)
             self.iterations += 1
             if np.all(np.sqrt(new[0]) * self.error <= goal * np.sqrt(start[0])):
                 break
-            kernels.turn(z, p, _ratio(new, rz), self.basis.n_nodes)
+            self.team.all(kernels.turn, self.slabs, z, p, _ratio(new, rz))
             rz = new
         return x
 
