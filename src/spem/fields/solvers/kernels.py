@@ -4,10 +4,10 @@ A level is a graph in C order with, per node, neighbours in 2d directions (a dum
 missing one), a Laplacian diagonal and a mass; lane l of node i has the diagonal ``diagonal[i] + shift[l] *
 mass[i]``. `weight` and `mass` have one row for all nodes (finest level, `step` 0) or one per node (`step` 1).
 
-Nodes are cut along the first axis into slabs, even and odd ones in turn; ``slabs[k]`` is the first node of
-slab k. A kernel does the slabs `first`, ``first + stride``, ... . Sweeps do all even slabs, then all odd ones,
-and back in reverse: slabs of one colour never touch, so threads share them and the answer does not depend on
-how many there are.
+Nodes are cut along the first axis into slabs, even and odd ones in turn; ``slabs[k]`` is the first node
+of slab k. A kernel does the slabs `first`, ``first + stride``, ... . Sweeps do all even slabs, then all odd
+ones, and back in reverse: slabs of one colour never touch, so threads share them and the answer does not
+depend on how many there are.
 """
 
 from __future__ import annotations
