@@ -1,0 +1,100 @@
+"""``spem demo``: a collection of creatures, from files to codes, answers, scores and pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from spem.cli.encode import encode_paths
+from spem.cli.options import Json
+from spem.cli.output import check_folder, print_json, print_table
+from spem.cli.search import REPORT, print_scores, score, summary
+
+if TYPE_CHECKING:
+    from spem.codes.codes import Codes
+
+# Enough for scores that mean something, and for a minute on two cores.
+CREATURES_PER_CLASS = 5
+VOXELS = 8000
+ANSWERS = 5
+RHO = [0.05, 0.1, 0.2, 0.4]
+
+
+def demo(
+    folder: Annotated[Path, typer.Argument(metavar="[FOLDER]", help="Where to.")] = Path("spem-demo"),
+    seed: Annotated[int, typer.Option(help="Seed of the collection.")] = 0,
+    json: Json = False,
+) -> None:
+    """Make a collection, and all that can be made of it.
+
+    Creatures as silhouettes and as meshes, their codes, answers to a query, scores, pictures and a report.
+
+    \b
+    Examples:
+      spem demo
+      spem demo creatures --seed 7
+    """  # noqa: D301
+    check_folder(folder)
+    import numpy as np
+
+    from spem.shapes.creatures import write_collection
+
+    folders = write_collection(folder, n_per_class=CREATURES_PER_CLASS, rng=np.random.default_rng(seed))
+    written: list[Path] = []
+    facts: dict[str, Any] = {}
+    for shapes in folders:
+        facts[shapes.name] = _collection(shapes, written, quiet=json)
+    if json:
+        print_json(facts | {"written": written})
+        return
+    typer.echo("\npictures and reports:")
+    for path in written:
+        typer.echo(f"  {path}")
+
+
+def _collection(shapes: Path, written: list[Path], *, quiet: bool) -> dict[str, Any]:
+    """Encode, search and score one folder of shapes, and draw the first of them."""
+    from spem.cli.report import write_collection_report
+    from spem.collections import row_keys
+    from spem.retrieval.labels import match_labels, read_labels
+
+    root = shapes.parent
+    codes, _ = encode_paths([str(shapes)], root / f"{shapes.name}.spem", {"voxels": VOXELS}, overwrite=True)
+    classes = match_labels(row_keys(codes), read_labels(shapes / "labels.csv"))
+    scores = score(codes, classes)
+    if not quiet:
+        typer.echo(f"\n{shapes}")
+        print_scores(summary(scores))
+        _print_answers(codes)
+    pictures = [root / f"{shapes.name}-fields.png", root / f"{shapes.name}-maps.png"]
+    _draw(Path(codes.paths[0]), *pictures)
+    report = root / f"{shapes.name}-{REPORT}"
+    title = f"Creatures, {shapes.name}"
+    written += [*pictures, write_collection_report(report, codes, classes, scores, title=title)]
+    return summary(scores)
+
+
+def _print_answers(codes: Codes) -> None:
+    """Print the answers to the first shape as a query."""
+    from spem.retrieval.ranking import rank
+
+    answers = rank(codes.vectors[0], codes, ANSWERS)
+    typer.echo(f"answers to {codes.names[0]}")
+    print_table(
+        ("rank", "distance", "name"), [(str(a.rank), f"{a.distance:.4f}", a.name) for a in answers], (2,)
+    )
+
+
+def _draw(path: Path, fields_file: Path, maps_file: Path) -> None:
+    """Draw fields and maps of one file."""
+    import spem
+    from spem.cli.output import write_figure
+    from spem.plots.figures import figure_fields, figure_maps
+
+    shape = spem.read(path, voxels=VOXELS)
+    rho = [share * shape.size for share in RHO]
+    titles = [f"ρ = {share:g} L" for share in RHO]
+    write_figure(fields_file, figure_fields(shape, spem.field(shape, rho), titles))
+    write_figure(maps_file, figure_maps(spem.maps(shape, 4)))

@@ -1,0 +1,262 @@
+"""``spem encode``: the codes of a collection, with progress, and resumed where it stopped."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from spem.cli.options import (
+    BoundaryChoice,
+    ComponentsChoice,
+    Device,
+    Jobs,
+    Json,
+    SchemeChoice,
+    check_device,
+)
+from spem.cli.output import check_target, complain, print_json
+from spem.cli.progress import Bar
+from spem.errors import ModelError, ParameterError, ReadError
+
+if TYPE_CHECKING:
+    from spem.codes.codes import Codes, Failure
+    from spem.codes.model import Model
+    from spem.codes.settings import Settings
+
+# A process takes seconds to start, as long as it takes to code this many shapes.
+SHAPES_PER_PROCESS = 100
+
+
+def encode(
+    paths: Annotated[
+        list[str],
+        typer.Argument(metavar="PATH", help="Files, folders with all below them, patterns."),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="CODES", help="File of the codes.")],
+    vocabulary: Annotated[
+        Path | None, typer.Option(help="Model or codes whose vocabulary and settings are reused.")
+    ] = None,
+    save_vocabulary: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the model to a file of its own too.")
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Make CODES anew instead of adding to it.")
+    ] = False,
+    voxels: Annotated[int | None, typer.Option(min=1, help="Voxels inside each shape. [15000]")] = None,
+    own_grid: Annotated[
+        bool, typer.Option("--own-grid", help="Keep the grid of images and volumes, whatever their size.")
+    ] = False,
+    boundary: Annotated[BoundaryChoice | None, typer.Option(help="Where v = 1. [surface]")] = None,
+    rho_range: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LOW:HIGH", help="Range of ρ in units of the shape's size; may be repeated."),
+    ] = None,
+    n_rho: Annotated[int | None, typer.Option(min=1, help="Number of ρ in each range. [64]")] = None,
+    rho_scheme: Annotated[SchemeChoice | None, typer.Option(help="How ρ is spread. [linear]")] = None,
+    n_maps: Annotated[int | None, typer.Option(min=1, help="Maps of each range.")] = None,
+    n_centers: Annotated[int | None, typer.Option(min=1, help="Centres of the vocabulary.")] = None,
+    power: Annotated[float | None, typer.Option(help="Exponent of the residuals, α of (5.3).")] = None,
+    threshold: Annotated[float | None, typer.Option(help="Grey level of the surface.")] = None,
+    dark: Annotated[
+        bool | None, typer.Option("--dark/--light", help="Whether shapes are darker than the ground.")
+    ] = None,
+    components: Annotated[ComponentsChoice | None, typer.Option(help="What is kept. [largest]")] = None,
+    paper: Annotated[bool, typer.Option("--paper", help="Settings of the paper, section 5.5.")] = False,
+    seed: Annotated[int | None, typer.Option(help="Seed of the vocabulary. [0]")] = None,
+    jobs: Jobs = None,
+    device: Device = "cpu",
+    json: Json = False,
+) -> None:
+    """Make the codes of a collection.
+
+    Fields, maps, a vocabulary learnt from them, and a code for each shape; a label volume gives one shape a
+    label. Files that fail are told, one line each, and the others saved. When CODES is there already, new
+    files are added with its vocabulary and settings, and what has not changed is reused.
+    An interrupted run goes on from CODES.work when the same command is given again.
+
+    \b
+    Examples:
+      spem encode shapes/ -o shapes.spem
+      spem encode 'scans/**/*.off' -o scans.spem --voxels 60000 --jobs 4
+      spem encode new/ -o new.spem --vocabulary shapes.spem
+      spem encode more/ -o shapes.spem                      adds to shapes.spem
+    """  # noqa: D301
+    check_device(device)
+    check_target(output)
+    if save_vocabulary is not None:
+        check_target(save_vocabulary)
+    options: dict[str, Any] = {
+        "voxels": voxels,
+        "boundary": boundary and boundary.value,
+        "rho_ranges": _ranges(rho_range),
+        "n_rho": n_rho,
+        "scheme": rho_scheme and rho_scheme.value,
+        "n_maps": n_maps,
+        "n_centers": n_centers,
+        "power": power,
+        "threshold": threshold,
+        "dark": dark,
+        "components": components and components.value,
+        "seed": seed,
+    }
+    given = {key: value for key, value in options.items() if value is not None}
+    given |= {"voxels": None} if own_grid else {}
+    codes, n_failed = encode_paths(
+        paths, output, given, vocabulary=vocabulary, overwrite=overwrite, paper=paper, jobs=jobs
+    )
+    if save_vocabulary is not None:
+        codes.model.save(save_vocabulary)
+    facts = {"output": output, "n_shapes": len(codes), "n_failed": n_failed, "model": codes.model.digest}
+    if json:
+        failures = [{"path": failure.path, "reason": failure.reason} for failure in codes.failures]
+        print_json(facts | {"failures": failures, "settings": codes.model.settings.to_json()})
+    else:
+        failed = f", {n_failed} failed" if n_failed else ""
+        typer.echo(f"wrote {output}: {len(codes)} shapes{failed}, model {codes.model.digest}")
+    if n_failed:
+        raise typer.Exit(1)
+
+
+def encode_paths(
+    paths: list[str],
+    output: Path,
+    options: dict[str, Any],
+    *,
+    vocabulary: Path | None = None,
+    overwrite: bool = False,
+    paper: bool = False,
+    jobs: int | None = None,
+) -> tuple[Codes, int]:
+    """Encode files into a codes file, or add them to it.
+
+    Parameters
+    ----------
+    paths
+        Files, folders, patterns.
+    output
+        The codes file.
+    options
+        Settings that were asked for, by name.
+    vocabulary
+        Model or codes to reuse.
+    overwrite
+        Whether codes that are there already are left out of account.
+    paper
+        Whether settings that were not asked for are those of the paper.
+    jobs
+        Number of processes; by the number of shapes where None.
+
+    Returns
+    -------
+    codes
+        What was written.
+    n_failed
+        Number of failures of this run.
+
+    Raises
+    ------
+    SpemError
+        When nothing could be encoded.
+    KeyboardInterrupt
+        When interrupted, with a word on how to go on.
+    """
+    from spem.codes.codes import Codes
+    from spem.codes.collection import encode_collection, merge
+    from spem.codes.sources import find_files
+
+    files = [path for path in find_files(paths) if path.absolute() != output.absolute()]
+    known = Codes.load(output) if output.exists() and not overwrite else None
+    model = load_model(vocabulary) if vocabulary is not None else None
+    if known is not None and model is not None and model.digest != known.model.digest:
+        msg = f"{output}: is there already, made with another vocabulary than {vocabulary}; give --overwrite"
+        raise ModelError(msg)
+    model = known.model if known is not None else model
+    settings = _settings(options, model, output if known is not None else vocabulary, paper=paper)
+    work = output.with_name(output.name + ".work")
+    n_jobs = jobs or max(1, min(len(os.sched_getaffinity(0)), len(files) // SHAPES_PER_PROCESS))
+    with Bar() as bar:
+        try:
+            codes = encode_collection(
+                list(files),
+                settings,
+                model=model,
+                known=known,
+                n_jobs=n_jobs,
+                work=work,
+                progress=bar.advance,
+                on_failure=_report,
+            )
+        except KeyboardInterrupt:
+            msg = f"interrupted; what is done is kept in {work}: give the same command again to go on"
+            raise KeyboardInterrupt(msg) from None
+    n_failed = len(codes.failures)
+    if known is not None:
+        codes = merge(known, codes)
+    codes.save(output)
+    return codes, n_failed
+
+
+def load_model(path: Path) -> Model:
+    """Read the model of a model file or of a codes file.
+
+    Raises
+    ------
+    ReadError
+        When it is neither.
+    """
+    from spem.codes.codes import Codes
+    from spem.codes.model import Model
+
+    try:
+        return Model.load(path)
+    except ReadError as error:
+        try:
+            return Codes.load(path).model
+        except ReadError:
+            raise error from None
+
+
+def _settings(
+    options: dict[str, Any], model: Model | None, source: Path | None, *, paper: bool
+) -> Settings | None:
+    """Return the settings to encode with; a model has its own, and options must not say otherwise."""
+    from spem.codes.settings import Settings
+
+    if model is None:
+        return Settings.paper(**options) if paper else Settings(**options)
+    for key, value in options.items():
+        fixed = getattr(model.settings, key)
+        if value != fixed:
+            msg = f"{key}={value}: {source} has {key}={fixed}; leave it out, or write another file"
+            raise ParameterError(msg)
+    return None
+
+
+def _ranges(texts: list[str] | None) -> tuple[tuple[float, float], ...] | None:
+    """Parse ranges of ρ."""
+    if not texts:
+        return None
+    ranges = []
+    for text in texts:
+        try:
+            low, high = (float(part) for part in text.split(":"))
+        except ValueError as error:
+            msg = f"--rho-range {text}: expected LOW:HIGH, such as 0.025:0.25, in units of the shape's size"
+            raise ParameterError(msg) from error
+        if not 0 < low < high < math.inf:
+            msg = f"--rho-range {text}: expected 0 < LOW < HIGH, in units of the shape's size"
+            raise ParameterError(msg)
+        ranges.append((low, high))
+    return tuple(ranges)
+
+
+def _report(failure: Failure) -> None:
+    """Tell of a file that gave no code."""
+    said = failure.reason.startswith(failure.path)
+    complain(failure.reason if said else f"{failure.path}: {failure.reason}")
+    sys.stderr.flush()

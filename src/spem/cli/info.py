@@ -1,0 +1,117 @@
+"""``spem info``: what was read and what was repaired."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from spem.cli.options import (
+    Components,
+    ComponentsChoice,
+    Dark,
+    InnerRadius,
+    Json,
+    Label,
+    ShapeFile,
+    Spacing,
+    Threshold,
+    Voxels,
+    read_shape,
+)
+from spem.cli.output import print_json
+
+if TYPE_CHECKING:
+    from spem.shapes.shape import Shape
+
+
+def info(
+    shape: ShapeFile,
+    voxels: Voxels = None,
+    spacing: Spacing = None,
+    inner_radius: InnerRadius = None,
+    threshold: Threshold = None,
+    dark: Dark = None,
+    label: Label = None,
+    components: Components = ComponentsChoice.largest,
+    json: Json = False,
+) -> None:
+    """Tell what is read from a file, and what is repaired.
+
+    \b
+    Examples:
+      spem info hand.png
+      spem info cat.off --voxels 100000
+      spem info teeth.nii.gz --label 3 --json
+    """  # noqa: D301
+    found = read_shape(
+        shape,
+        voxels=voxels,
+        spacing=spacing,
+        inner_radius=inner_radius,
+        threshold=threshold,
+        dark=dark,
+        label=label,
+        components=components,
+    )
+    facts = describe(found)
+    if json:
+        print_json(facts)
+        return
+    width = max(map(len, facts))
+    for key, value in facts.items():
+        text = _text(value)
+        if text:
+            typer.echo(f"{key.replace('_', ' '):<{width}}  {text}")
+
+
+def describe(shape: Shape) -> dict[str, Any]:
+    """Return the facts about a shape by name.
+
+    Parameters
+    ----------
+    shape
+        Any shape.
+
+    Examples
+    --------
+    >>> import spem
+    >>> describe(spem.synthetic.interval(length=9.0, spacing=1.0))["dimensions"]
+    1
+    """
+    from spem.fields.rho import sample_rho
+
+    report = shape.report
+    rho = sample_rho(shape.size, count=2)
+    return {
+        "name": shape.name,
+        "source": report.source,
+        "dimensions": shape.ndim,
+        "voxels": shape.n_nodes,
+        "grid": list(shape.mask.shape),
+        "spacing": list(shape.spacing),
+        "origin": list(shape.origin),
+        "volume": shape.volume,
+        "size": shape.size,
+        "default_rho": [float(rho[0]), float(rho[1])],
+        "cut_edges": len(shape.cuts),
+        "method": report.method,
+        "watertight": report.watertight,
+        "components": report.components,
+        "volume_kept": report.volume_kept,
+        "repairs": list(report.repairs),
+    }
+
+
+def _text(value: Any) -> str:
+    """Write a fact for people; nothing where it is unknown."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        joint = "; " if value and isinstance(value[0], str) else " "
+        return joint.join(_text(entry) for entry in value) or "none"
+    return str(value)

@@ -1,0 +1,125 @@
+"""Options that several commands share, and the shape they ask for."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from spem.cli.output import complain
+from spem.errors import ParameterError
+
+if TYPE_CHECKING:
+    from spem.shapes.shape import Shape
+
+
+class BoundaryChoice(StrEnum):
+    """Where v = 1 holds."""
+
+    surface = "surface"
+    voxel = "voxel"
+
+
+class SchemeChoice(StrEnum):
+    """How ρ is spread over its range."""
+
+    linear = "linear"
+    squared = "squared"
+    log = "log"
+
+
+class ComponentsChoice(StrEnum):
+    """Which connected components of a shape are kept."""
+
+    largest = "largest"
+    all = "all"
+
+
+ShapeFile = Annotated[Path, typer.Argument(metavar="SHAPE", help="Image, volume or mesh.")]
+Voxels = Annotated[
+    int | None,
+    typer.Option(
+        min=1, help="Number of voxels inside. [meshes: 15000; images and volumes keep their own grid]"
+    ),
+]
+Spacing = Annotated[
+    float | None, typer.Option(help="Distance between voxel centres, in the unit of the file.")
+]
+InnerRadius = Annotated[
+    float | None, typer.Option(help="Distance from the deepest voxel to the boundary, in voxels.")
+]
+Threshold = Annotated[
+    float | None, typer.Option(help="Grey level of the surface, of images and grey volumes.")
+]
+Dark = Annotated[
+    bool | None,
+    typer.Option("--dark/--light", help="Whether the shape is darker than the ground. [by the border]"),
+]
+Label = Annotated[int | None, typer.Option(help="The label to take from a label volume.")]
+Components = Annotated[ComponentsChoice, typer.Option(help="Keep the largest component or all.")]
+Boundary = Annotated[
+    BoundaryChoice,
+    typer.Option(help="Where v = 1: on the surface, or on the voxels outside (paper)."),
+]
+Device = Annotated[str, typer.Option(help="Where to compute; cpu is all there is.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+Plot = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a picture too (.png, .pdf or .svg).")]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", "-j", min=1, help="Number of processes. [by the number of shapes and of cores]"),
+]
+CodesFile = Annotated[Path, typer.Argument(metavar="CODES", help="File that `spem encode` wrote.")]
+
+
+def check_device(device: str) -> None:
+    """Refuse a device that there is no code for.
+
+    Raises
+    ------
+    ParameterError
+        For anything but ``"cpu"``.
+
+    Examples
+    --------
+    >>> check_device("cpu")
+    """
+    if device != "cpu":
+        msg = f"--device {device}: this version computes on the cpu only; use --device cpu or leave it out"
+        raise ParameterError(msg)
+
+
+def read_shape(
+    path: Path,
+    *,
+    voxels: int | None = None,
+    spacing: float | None = None,
+    inner_radius: float | None = None,
+    threshold: float | None = None,
+    dark: bool | None = None,
+    label: int | None = None,
+    components: ComponentsChoice = ComponentsChoice.largest,
+) -> Shape:
+    """Read a shape as the options say, and tell on stderr what was changed.
+
+    Raises
+    ------
+    SpemError
+        When there is no shape in the file, or options do not go with it.
+    """
+    from spem.shapes.read import read
+
+    shape = read(
+        path,
+        voxels=voxels,
+        spacing=spacing,
+        inner_radius=inner_radius,
+        threshold=threshold,
+        dark=dark,
+        label=label,
+        components=components.value,
+    )
+    for repair in shape.report.repairs:
+        complain(f"{path}: {repair}")
+    return shape

@@ -1,0 +1,140 @@
+"""``spem search`` and ``spem evaluate``: ranked answers, scores and the report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from spem.cli.options import CodesFile, Jobs, Json
+from spem.cli.output import (
+    check_folder,
+    check_target,
+    complain,
+    print_json,
+    print_table,
+    to_json,
+    write_bytes,
+)
+
+if TYPE_CHECKING:
+    from spem.codes.codes import Codes
+    from spem.retrieval.evaluation import Scores
+
+REPORT = "report.html"
+
+
+def search(
+    codes: CodesFile,
+    query: Annotated[
+        str, typer.Argument(metavar="QUERY", help="File of a shape, or the name of one among the codes.")
+    ],
+    k: Annotated[int, typer.Option("-k", min=1, help="Number of answers.")] = 10,
+    json: Json = False,
+) -> None:
+    """Rank the shapes of a collection for a query.
+
+    The nearest comes first. The query is coded with the settings and the vocabulary of the codes. One of the collection finds itself.
+
+    \b
+    Examples:
+      spem search shapes.spem query.obj
+      spem search shapes.spem cat_03 -k 5 --json
+    """  # noqa: D301
+    from spem.collections import search as find
+
+    answers = find(codes, query, k)
+    if json:
+        print_json(
+            [{"rank": a.rank, "name": a.name, "path": a.path, "distance": a.distance} for a in answers]
+        )
+        return
+    rows = [(str(a.rank), f"{a.distance:.4f}", a.name, a.path) for a in answers]
+    print_table(("rank", "distance", "name", "path"), rows, left=(2, 3))
+
+
+def evaluate(
+    codes: CodesFile,
+    labels: Annotated[
+        Path, typer.Option(help="Labels: lines 'file,label', or a Princeton classification (.cla).")
+    ],
+    json: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the scores as JSON; - is stdout.")
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write report.html, a page on the collection, there."),
+    ] = None,
+    jobs: Jobs = None,
+) -> None:
+    """Score a collection whose labels are known.
+
+    NN, FT, ST, E and DCG in percent, each shape being a query in turn.
+
+    \b
+    Examples:
+      spem evaluate shapes.spem --labels shapes/labels.csv
+      spem evaluate shapes.spem --labels test.cla --json scores.json --report report/
+    """  # noqa: D301
+    to_stdout = json is not None and str(json) == "-"
+    if json is not None and not to_stdout:
+        check_target(json)
+    if report is not None:
+        check_folder(report)
+    from spem.codes.codes import Codes
+    from spem.collections import row_keys
+    from spem.retrieval.labels import match_labels, read_labels, unused_labels
+
+    collection, table = Codes.load(codes), read_labels(labels)
+    keys = row_keys(collection)
+    classes = match_labels(keys, table)
+    unused = unused_labels(keys, table)
+    if unused:
+        complain(f"{labels}: {len(unused)} labels are for files without a code, such as {unused[0]}")
+    scores = score(collection, classes)
+    facts = summary(scores)
+    if json is not None and not to_stdout:
+        write_bytes(json, (to_json(facts) + "\n").encode())
+    if to_stdout:
+        print_json(facts)
+    else:
+        print_scores(facts)
+    if report is not None:
+        from spem.cli.report import write_collection_report
+
+        page = write_collection_report(
+            report / REPORT, collection, classes, scores, title=codes.stem, jobs=jobs or 1
+        )
+        typer.echo(f"wrote {page}", err=to_stdout)
+
+
+def score(codes: Codes, classes: list[str]) -> Scores:
+    """Score codes against the class of each row, and tell of classes of one."""
+    from spem.collections import evaluate as score_codes
+
+    scores = score_codes(codes, classes)
+    if scores.skipped:
+        alone = ", ".join(classes[i] for i in scores.skipped[:3]) + (
+            ", ..." if len(scores.skipped) > 3 else ""
+        )
+        complain(f"{len(scores.skipped)} shapes are alone in their class and not scored: {alone}")
+    return scores
+
+
+def summary(scores: Scores) -> dict[str, Any]:
+    """Return scores as the JSON of the command line has them."""
+    return {
+        **scores.mean(),
+        "n_shapes": len(scores.labels),
+        "n_classes": len(set(scores.labels)),
+        "n_skipped": len(scores.skipped),
+        "per_class": scores.per_class(),
+    }
+
+
+def print_scores(facts: dict[str, Any]) -> None:
+    """Print the means of all measures."""
+    measures = ("NN", "FT", "ST", "E", "DCG")
+    typer.echo(f"{facts['n_shapes']} shapes in {facts['n_classes']} classes, percent")
+    print_table(measures, [tuple(f"{facts[name]:.1f}" for name in measures)])
