@@ -55,9 +55,7 @@ def write_collection_report(
     """
     distances = correlation_distance(codes.vectors, codes.vectors)
     pictures = _thumbnails(codes, jobs)
-    shown = set(
-        list(dict(zip(reversed(classes), reversed(range(len(codes))), strict=True)).values())[-MAP_PICTURES:]
-    )
+    shown = [classes.index(label) for label in dict.fromkeys(classes)][:MAP_PICTURES]
     return write_report(
         path,
         title=title,

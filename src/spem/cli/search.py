@@ -35,7 +35,8 @@ def search(
 ) -> None:
     """Rank the shapes of a collection for a query.
 
-    The nearest comes first. The query is coded with the settings and the vocabulary of the codes. One of the collection finds itself.
+    The nearest comes first. The query is coded with the settings and the vocabulary of the codes. One of
+    the collection finds itself.
 
     \b
     Examples:
