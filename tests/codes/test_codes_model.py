@@ -31,7 +31,7 @@ def test_model_codes_as_the_estimator_does(model):
     """A model's codes are those of VLAD with the same parameters."""
     expected = VLAD(4, random_state=0).fit(shapes()).transform(shapes(1))
     np.testing.assert_allclose([model.encode(bands) for bands in shapes(1)], expected, atol=1e-6)
-    assert model.n_code == 24
+    assert model.n_code == 48
 
 
 def test_saved_model_is_the_same_model(model, tmp_path):
@@ -49,7 +49,7 @@ def test_digest_tells_settings_and_vocabularies_apart(model):
     assert Model.fit(SETTINGS, shapes()).digest == model.digest
     assert Model.fit(SETTINGS, shapes(3)).digest != model.digest
     other = Settings(n_maps=3, n_centers=4, rho_ranges=SETTINGS.rho_ranges, voxels=99)
-    assert Model(other, model.normalisations, model.centers).digest != model.digest
+    assert Model(other, model.normalisations, model.centers, model.spreads).digest != model.digest
     assert len(model.digest) == 12
 
 
@@ -62,7 +62,19 @@ def test_maps_of_other_bands_are_refused(model):
 def test_arrays_must_fit_the_settings(model):
     """A model is refused whose arrays are not those of its settings."""
     with pytest.raises(ModelError, match="2 bands, 4 centres and 3 maps got arrays"):
-        Model(SETTINGS, model.normalisations, (model.centers[0], model.centers[1][:2]))
+        Model(SETTINGS, model.normalisations, (model.centers[0], model.centers[1][:2]), model.spreads)
+    with pytest.raises(ModelError, match="got arrays"):
+        Model(SETTINGS, model.normalisations, model.centers)
+
+
+def test_model_of_one_moment_has_no_spreads(tmp_path):
+    """The paper's codes are half as long, need no spreads, and survive their file."""
+    settings = Settings.paper(n_maps=3, n_centers=4, rho_ranges=SETTINGS.rho_ranges)
+    model = Model.fit(settings, shapes())
+    model.save(tmp_path / "p.spem")
+    loaded = Model.load(tmp_path / "p.spem")
+    assert (model.n_code, loaded.spreads, loaded.digest) == (24, (), model.digest)
+    np.testing.assert_array_equal(loaded.encode(shapes(1)[0]), model.encode(shapes(1)[0]))
 
 
 def test_model_of_a_later_method_is_refused(model, tmp_path, monkeypatch):

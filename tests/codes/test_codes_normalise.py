@@ -55,6 +55,21 @@ def test_deviations_of_constant_maps_are_refused():
         relative_deviations([np.ones((5, 2))])
 
 
+def test_standard_nodes_have_unit_deviation():
+    """Over the training nodes every standardised projection has mean zero and deviation one."""
+    rng = np.random.default_rng(0)
+    unit = [unit_rms(rng.normal(2, 1, (300, 3)) * [1, 5, 9]) for _ in range(4)]
+    normal = Normalisation.standard(unit)
+    nodes = np.concatenate([normal.apply(maps) for maps in unit])
+    np.testing.assert_allclose([nodes.mean(axis=0), nodes.std(axis=0)], [[0] * 3, [1] * 3], atol=1e-12)
+
+
+def test_standardising_does_not_blow_up_what_is_constant():
+    """A projection that is zero everywhere gives zeros."""
+    maps = np.random.default_rng(0).normal(size=(200, 2)) * [1, 0]
+    assert not Normalisation.standard([unit_rms(maps)]).apply(maps)[:, 1].any()
+
+
 def test_whitened_nodes_have_unit_covariance():
     """Over the training nodes whitened features have mean zero and covariance one."""
     rng = np.random.default_rng(0)
@@ -80,6 +95,8 @@ def test_deviation_weights_are_those_of_the_paper():
 
 
 def test_whitening_of_constant_maps_is_refused():
-    """Maps that nowhere vary cannot be whitened."""
+    """Maps that nowhere vary cannot be whitened or standardised."""
     with pytest.raises(ParameterError, match="no projection varies"):
         Normalisation.whitening([np.ones((5, 2))])
+    with pytest.raises(ParameterError, match="no projection varies"):
+        Normalisation.standard([np.ones((5, 2))])

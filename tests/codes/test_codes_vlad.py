@@ -32,6 +32,29 @@ def test_vlad_by_hand():
     np.testing.assert_allclose(vlad(nodes, centers, power=0.5), expected, rtol=1e-14)
 
 
+def test_second_moments_by_hand():
+    """Squares (4, 0) and (0, 16), two nodes of mean squares (1, 11): an excess of (2, -6) beside R = 0."""
+    nodes, center = np.array([[2.0, 0.0], [-2.0, 0.0], [0.0, 4.0], [0.0, -4.0]]), np.zeros((1, 2))
+    code = vlad(nodes, center, 1.0, spreads=np.array([[1.0, 11.0]]))
+    np.testing.assert_allclose(code, [0, 0, 4 / np.hypot(4, 12), -12 / np.hypot(4, 12)], atol=1e-14)
+
+
+def test_second_moments_tell_apart_what_first_ones_do_not():
+    """Two shapes whose nodes lie about a centre equally far, but along different axes."""
+    wide, tall = np.array([[1.0, 0.1], [-0.9, 0.1]]), np.array([[0.05, 1.0], [0.05, -0.8]])
+    center, spreads = np.zeros((1, 2)), np.full((1, 2), 0.5)
+    assert vlad(wide, center, 1.0) @ vlad(tall, center, 1.0) > 0.99
+    assert vlad(wide, center, 1.0, spreads) @ vlad(tall, center, 1.0, spreads) < 0.1
+
+
+def test_moments_and_paper_settings_share_the_first_half():
+    """The first moments of a code of two are those of the code of one, but for the total length."""
+    shapes = collection()
+    one, two = (VLAD(5, moments=m, random_state=0).fit_transform(shapes) for m in (1, 2))
+    first = two.reshape(4, 5, 2, 3)[:, :, 0].reshape(4, -1)
+    np.testing.assert_allclose(first / np.linalg.norm(first, axis=1, keepdims=True), one, rtol=1e-12)
+
+
 def test_vlad_of_nodes_on_their_centres_is_zero():
     """Where all differences vanish the code is zero and nothing is divided by zero."""
     centers = np.array([[0.0, 1.0], [2.0, 3.0]])
@@ -67,15 +90,16 @@ def test_codes_have_unit_length_and_equal_bands():
 
 
 def test_scaling_is_chosen():
-    """Each scaling makes its normalisation: identity, relative deviations, or a full transform."""
+    """Each scaling makes its normalisation: identity, deviations, their inverse or a full one."""
     shapes = [(np.float64(maps) * [9, 1, 1],) for (maps,) in collection()]
     transforms = {
         scaling: VLAD(3, scaling=scaling, random_state=0).fit(shapes).normalisations_[0].transform
-        for scaling in ("none", "deviation", "whiten")
+        for scaling in ("none", "deviation", "whiten", "standard")
     }
     assert transforms["none"].tolist() == np.eye(3).tolist()
     assert transforms["deviation"][0, 0] / transforms["deviation"][1, 1] == pytest.approx(9, rel=0.2)
     assert np.count_nonzero(transforms["whiten"]) == 9
+    assert np.count_nonzero(transforms["standard"]) == 3
 
 
 def test_one_band_may_come_as_an_array_and_shapes_as_a_generator():
@@ -100,7 +124,7 @@ def test_codes_as_a_data_frame_with_named_columns():
     """Pandas output has one named column for each entry of a code."""
     learner = VLAD(2, random_state=0).set_output(transform="pandas")
     frame = clone(learner).set_output(transform="pandas").fit_transform(collection())
-    assert list(frame.columns) == [f"vlad{i}" for i in range(6)]
+    assert list(frame.columns) == [f"vlad{i}" for i in range(12)]
 
 
 @pytest.mark.parametrize(
@@ -123,7 +147,15 @@ def test_bad_maps_are_refused(shapes, message):
 
 
 @pytest.mark.parametrize(
-    "bad", [{"power": 1.5}, {"scaling": "z"}, {"n_centers": 0}, {"nodes_per_shape": 0}, {"n_init": 0}]
+    "bad",
+    [
+        {"power": 1.5},
+        {"scaling": "z"},
+        {"moments": 3},
+        {"n_centers": 0},
+        {"nodes_per_shape": 0},
+        {"n_init": 0},
+    ],
 )
 def test_bad_parameters_are_refused(bad):
     """Parameters out of their range are named."""

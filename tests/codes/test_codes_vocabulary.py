@@ -1,4 +1,4 @@
-"""Nearest centres, residual sums and the vocabulary estimator."""
+"""Nearest centres, residual moments and the vocabulary estimator."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from spem.codes.vocabulary import Vocabulary, nearest_centers, residual_sums
+from spem.codes.vocabulary import Vocabulary, nearest_centers, sum_residuals
 from spem.errors import ParameterError
 
 
@@ -27,9 +27,22 @@ def test_kernels_agree_with_the_definition(seed, n_nodes, n_features, n_centers,
     squares = ((nodes[:, None].astype(float) - centers) ** 2).sum(-1)
     labels = nearest_centers(nodes, centers)
     np.testing.assert_allclose(squares[np.arange(n_nodes), labels], squares.min(1), rtol=1e-5)
-    expected = np.zeros((n_centers, n_features))
-    np.add.at(expected, labels, nodes.astype(float) - centers[labels])
-    np.testing.assert_allclose(residual_sums(nodes, centers), expected, atol=1e-11)
+    sums, squares = np.zeros((2, n_centers, n_features))
+    np.add.at(sums, labels, nodes.astype(float) - centers[labels])
+    np.add.at(squares, labels, (nodes.astype(float) - centers[labels]) ** 2)
+    found = sum_residuals(nodes, centers)
+    assert found.counts.tolist() == np.bincount(labels, minlength=n_centers).tolist()
+    np.testing.assert_allclose(found.sums, sums, atol=1e-11)
+    np.testing.assert_allclose(found.squares, squares, atol=1e-11)
+
+
+def test_squares_of_the_training_nodes_exceed_nothing():
+    """Against their own mean squares nodes have no excess, and a centre without a node has none."""
+    rng = np.random.default_rng(0)
+    nodes, centers = rng.normal(size=(60, 2)), np.array([[0.0, 0.0], [1.0, 1.0], [99.0, 99.0]])
+    found = sum_residuals(nodes, centers)
+    np.testing.assert_allclose(found.excess(found.spreads), 0, atol=1e-12)
+    np.testing.assert_allclose(sum_residuals(np.tile(nodes, (3, 1)), centers).spreads, found.spreads)
 
 
 def test_ties_go_to_the_first_centre():
@@ -41,8 +54,10 @@ def test_kernels_take_any_memory_layout():
     """Transposed and strided arrays give what contiguous ones give."""
     rng = np.random.default_rng(3)
     nodes, centers = np.asfortranarray(rng.normal(size=(50, 4))), rng.normal(size=(14, 4))[::2]
-    expected = residual_sums(nodes.copy("C"), centers.copy())
-    np.testing.assert_array_equal(residual_sums(nodes, centers), expected)
+    expected = sum_residuals(nodes.copy("C"), centers.copy())
+    found = sum_residuals(nodes, centers)
+    np.testing.assert_array_equal(found.sums, expected.sums)
+    np.testing.assert_array_equal(found.squares, expected.squares)
 
 
 def test_vocabulary_finds_separate_clusters():

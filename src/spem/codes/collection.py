@@ -85,7 +85,7 @@ def encode_collection(
     >>> squares = [Shape.from_mask(np.ones((n, n)), name=f"square {n}") for n in (9, 12)]
     >>> codes = encode_collection(squares, Settings(voxels=None, n_maps=2, n_centers=4))
     >>> codes.names, codes.vectors.shape
-    (('square 9', 'square 12'), (2, 8))
+    (('square 9', 'square 12'), (2, 16))
     """
     if known is not None:
         model = known.model if model is None else model
@@ -132,7 +132,7 @@ def encode_file(source: str | Path | Shape, model: Model) -> NDArray[np.float32]
     >>> square = Shape.from_mask(np.ones((9, 9)))
     >>> model = encode_collection([square], Settings(voxels=None, n_maps=2, n_centers=4)).model
     >>> encode_file(square, model).shape
-    (8,)
+    (16,)
     """
     with threadpool_limits(1):
         entries = _entries(as_source(source), model.settings, model)

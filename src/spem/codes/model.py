@@ -21,7 +21,7 @@ from spem.errors import ModelError, ParameterError
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Settings, normalisations and vocabularies.
+    """Settings, normalisations and vocabularies with their spreads.
 
     Parameters
     ----------
@@ -31,17 +31,22 @@ class Model:
         For each band what makes node features of maps.
     centers
         For each band ``(n_centers, n_maps)`` vocabulary.
+    spreads
+        For each band ``(n_centers, n_maps)`` mean squared difference of training nodes from their
+        centre; none with settings of one moment.
     """
 
     settings: Settings
     normalisations: tuple[Normalisation, ...]
     centers: tuple[NDArray[np.float32], ...]
+    spreads: tuple[NDArray[np.float32], ...] = ()
 
     def __post_init__(self) -> None:
         s = self.settings
         shapes = [array.shape for array in self.to_arrays().values()]
         n_bands, d = len(s.rho_ranges), s.n_maps
-        if shapes != [(d,), (d, d), (s.n_centers, d)] * n_bands:
+        expected = [(d,), (d, d), (s.n_centers, d)] * n_bands + [(s.n_centers, d)] * n_bands * (s.moments - 1)
+        if shapes != expected:
             msg = f"a model of {n_bands} bands, {s.n_centers} centres and {s.n_maps} maps got arrays {shapes}"
             raise ModelError(msg)
 
@@ -62,22 +67,24 @@ class Model:
         >>> rng = np.random.default_rng(0)
         >>> settings = Settings(n_maps=2, n_centers=4)
         >>> Model.fit(settings, [rng.random((50, 2)) for _ in range(3)])
-        Model(..., 1 band, 4 centres, 2 maps, codes of length 8)
+        Model(..., 1 band, 4 centres, 2 maps, codes of length 16)
         """
         learner = VLAD(
             settings.n_centers,
             power=settings.power,
             nodes_per_shape=settings.nodes_per_shape,
             scaling=settings.scaling,
+            moments=settings.moments,
             random_state=settings.seed,
         ).fit(shapes)
         centers = (words.cluster_centers_.astype(np.float32) for words in learner.vocabularies_)
-        return cls(settings, tuple(learner.normalisations_), tuple(centers))
+        spreads = (spread.astype(np.float32) for spread in learner.spreads_ * (settings.moments - 1))
+        return cls(settings, tuple(learner.normalisations_), tuple(centers), tuple(spreads))
 
     @property
     def n_code(self) -> int:
         """Length of a code."""
-        return sum(centers.size for centers in self.centers)
+        return self.settings.moments * sum(centers.size for centers in self.centers)
 
     @cached_property
     def digest(self) -> str:
@@ -109,7 +116,8 @@ class Model:
         if found != expected:
             msg = f"{name} has {found} maps in its bands, model {self.digest} expects {expected}"
             raise ParameterError(msg)
-        return encode(bands, self.normalisations, self.centers, self.settings.power).astype(np.float32)
+        learnt = self.normalisations, self.centers, self.settings.power, self.spreads or None
+        return encode(bands, *learnt).astype(np.float32)
 
     def to_arrays(self, prefix: str = "") -> dict[str, NDArray[Any]]:
         """Return the learnt arrays by name, for a file."""
@@ -118,7 +126,7 @@ class Model:
             arrays[f"{prefix}mean.{band}"] = normal.mean
             arrays[f"{prefix}transform.{band}"] = normal.transform
             arrays[f"{prefix}centers.{band}"] = words
-        return arrays
+        return arrays | {f"{prefix}spreads.{band}": array for band, array in enumerate(self.spreads)}
 
     @classmethod
     def from_arrays(
@@ -132,7 +140,9 @@ class Model:
                 Normalisation(arrays[f"{prefix}mean.{band}"], arrays[f"{prefix}transform.{band}"])
                 for band in bands
             )
-            return cls(checked, normalisations, tuple(arrays[f"{prefix}centers.{band}"] for band in bands))
+            centers = tuple(arrays[f"{prefix}centers.{band}"] for band in bands)
+            spreads = tuple(arrays[f"{prefix}spreads.{band}"] for band in bands if checked.moments == 2)
+            return cls(checked, normalisations, centers, spreads)
         except KeyError as error:
             msg = f"{source}: the model lacks the array {error}; make it again"
             raise ModelError(msg) from error

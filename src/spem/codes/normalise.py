@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from spem.errors import ParameterError
 
-Scaling = Literal["whiten", "deviation", "none"]
+Scaling = Literal["standard", "whiten", "deviation", "none"]
 # Directions in which the nodes vary less than this part of the largest variance are not blown up
 # further: what is left there is the error of the solver.
 _LEAST_VARIANCE = 1e-6
@@ -51,6 +51,21 @@ class Normalisation:
         """
         weights = relative_deviations(samples)
         return cls(np.zeros(weights.size), np.diag(weights))
+
+    @classmethod
+    def standard(cls, samples: Sequence[NDArray[np.floating]]) -> Self:
+        """Bring each projection to mean zero and deviation one over the training nodes.
+
+        Every projection then weighs the same in the assignment to words, however little of the
+        field's variance it has: the weak ones tell shapes apart. `samples` holds unit-rms
+        projections of training nodes.
+        """
+        nodes = np.concatenate(samples).astype(np.float64)
+        variance = nodes.var(axis=0)
+        if not variance.max() > 0:
+            raise ParameterError(_constant(nodes))
+        variance = np.maximum(variance, _LEAST_VARIANCE * variance.max())
+        return cls(nodes.mean(axis=0), np.diag(1 / np.sqrt(variance)))
 
     @classmethod
     def whitening(cls, samples: Sequence[NDArray[np.floating]]) -> Self:

@@ -55,6 +55,8 @@ class Settings:
         Exponent α of (5.3).
     scaling
         How the intensities of the projections are made comparable: see `Normalisation`.
+    moments
+        1 for the residual sums of (5.2) only, 2 for second moments beside them: see `vlad`.
     nodes_per_shape
         Number of nodes drawn from each shape for training.
     seed
@@ -83,7 +85,8 @@ class Settings:
     drop_boundary: bool = False
     n_centers: int = 64
     power: float = 0.5
-    scaling: Scaling = "whiten"
+    scaling: Scaling = "standard"
+    moments: int = 2
     nodes_per_shape: int = 500
     seed: int = 0
     code_format: int = CODE_FORMAT
@@ -110,6 +113,9 @@ class Settings:
             if getattr(self, name) not in get_args(kind):
                 msg = f"{name}={getattr(self, name)!r} must be one of {', '.join(get_args(kind))}"
                 raise ParameterError(msg)
+        if self.moments not in (1, 2):
+            msg = f"moments={self.moments!r} must be 1 or 2"
+            raise ParameterError(msg)
         if not 0 <= self.power <= 1:
             msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"
             raise ParameterError(msg)
@@ -134,6 +140,7 @@ class Settings:
             "n_centers": 32,
             "power": 0.25,
             "scaling": "deviation",
+            "moments": 1,
         }
         return cls(**(chosen | changes))
 

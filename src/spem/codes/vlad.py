@@ -14,18 +14,28 @@ from sklearn.utils.validation import check_is_fitted
 
 from spem.codes.bands import Bands, iterate_bands
 from spem.codes.normalise import Normalisation, Scaling, unit_rms
-from spem.codes.vocabulary import Vocabulary, residual_sums
+from spem.codes.vocabulary import Vocabulary, sum_residuals
 from spem.errors import ParameterError
 
 
 def vlad(
-    features: NDArray[np.floating], centers: NDArray[np.floating], power: float = 0.25
+    features: NDArray[np.floating],
+    centers: NDArray[np.floating],
+    power: float = 0.25,
+    spreads: NDArray[np.floating] | None = None,
 ) -> NDArray[np.float64]:
     """Aggregate the node features of one shape against a vocabulary: (5.1)-(5.3).
 
     Each node goes to its nearest centre, the differences are summed per centre, each sum is
     brought to unit L2 norm and then to sign(R) |R| ** power, and the whole to unit L2 norm. A
     centre without a node, or whose differences cancel, has zeros.
+
+    With `spreads` the second moments come beside the first: for each centre c with its nodes x,
+
+        Q = Σ (S(x) - c)² - σ²,
+
+    elementwise, where σ² is the mean square of the training nodes of c, is normalised like R and
+    put next to it. R tells where the nodes of a shape lie about a word, Q how widely.
 
     Parameters
     ----------
@@ -35,20 +45,23 @@ def vlad(
         ``(n_centers, n_features)`` vocabulary.
     power
         Exponent α of (5.3), in [0, 1].
+    spreads
+        ``(n_centers, n_features)`` mean squares σ² to compare with; None for first moments only.
 
     Returns
     -------
     NDArray
-        ``(n_centers * n_features,)`` code, centre by centre.
+        ``(n_centers * n_features,)`` code, centre by centre; twice that with `spreads`.
 
     Examples
     --------
     >>> vlad(np.array([[0.0, 0.0], [0.3, 0.4]]), np.array([[0.0, 0.0], [5.0, 5.0]]), power=1.0)
     array([0.6, 0.8, 0. , 0. ])
     """
-    residuals = residual_sums(features, centers)  # (n_centers, n_features)
-    residuals /= _length(residuals, axis=1)
-    code = np.sign(residuals) * np.abs(residuals) ** power
+    found = sum_residuals(features, centers)
+    moments = [found.sums] if spreads is None else [found.sums, found.excess(spreads)]
+    rows = np.hstack([moment / _length(moment, axis=1) for moment in moments])
+    code = np.sign(rows) * np.abs(rows) ** power
     return np.asarray((code / _length(code)).ravel())
 
 
@@ -57,6 +70,7 @@ def encode(
     normalisations: Sequence[Normalisation],
     centers: Sequence[NDArray[np.floating]],
     power: float = 0.25,
+    spreads: Sequence[NDArray[np.floating]] | None = None,
 ) -> NDArray[np.float64]:
     """Make the code of one shape from its maps, one band of ρ after the other.
 
@@ -73,11 +87,13 @@ def encode(
         For each band ``(n_centers, n_maps)`` vocabulary.
     power
         Exponent α of (5.3).
+    spreads
+        For each band ``(n_centers, n_maps)`` mean squares; None for first moments only.
 
     Returns
     -------
     NDArray
-        ``(n_code,)`` code, n_code = Σ n_centers · n_maps over the bands.
+        ``(n_code,)`` code: n_centers · n_maps entries for each band and moment.
 
     Examples
     --------
@@ -85,8 +101,11 @@ def encode(
     >>> encode((maps, -maps), (plain, plain), (words, words)).round(3)
     array([ 0.707, -0.707])
     """
-    together = zip(bands, normalisations, centers, strict=True)
-    code = np.concatenate([vlad(normal.apply(maps), words, power) for maps, normal, words in together])
+    squares = [None] * len(bands) if spreads is None else spreads
+    together = zip(bands, normalisations, centers, squares, strict=True)
+    code = np.concatenate(
+        [vlad(normal.apply(maps), words, power, spread) for maps, normal, words, spread in together]
+    )
     return np.asarray(code / _length(code))
 
 
@@ -97,7 +116,7 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
     or a tuple of such arrays, one a band, over the same nodes. Shapes may differ in their number
     of nodes. One map may be given as ``(n_nodes,)``, so that a two-dimensional array is a
     collection of shapes of one map each. The paper has ``n_centers=32, power=0.25,
-    scaling="deviation"``; the defaults retrieve better.
+    scaling="deviation", moments=1``; the defaults retrieve better.
 
     Parameters
     ----------
@@ -108,7 +127,9 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
     nodes_per_shape
         Number of nodes drawn from each shape for training, without replacement.
     scaling
-        ``"whiten"``, ``"deviation"`` or ``"none"``: see `Normalisation`.
+        ``"standard"``, ``"whiten"``, ``"deviation"`` or ``"none"``: see `Normalisation`.
+    moments
+        1 for the residual sums of (5.2), 2 for their squares beside them: see `vlad`.
     n_init
         Number of k-means++ starts for each vocabulary.
     random_state
@@ -120,6 +141,8 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         For each band the fitted `Normalisation`.
     vocabularies_
         For each band the fitted `Vocabulary`.
+    spreads_
+        For each band ``(n_centers, n_maps)`` mean squared difference of training nodes from their centre.
     n_maps_
         For each band the number of maps.
 
@@ -128,7 +151,7 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
     >>> rng = np.random.default_rng(0)
     >>> shapes = [rng.random((n, 2)) for n in (30, 40, 50)]
     >>> VLAD(n_centers=4, random_state=0).fit_transform(shapes).shape
-    (3, 8)
+    (3, 16)
     """
 
     def __init__(
@@ -137,7 +160,8 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         *,
         power: float = 0.5,
         nodes_per_shape: int = 500,
-        scaling: Scaling = "whiten",
+        scaling: Scaling = "standard",
+        moments: int = 2,
         n_init: int = 1,
         random_state: int | RandomState | None = None,
     ) -> None:
@@ -145,6 +169,7 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         self.power = power
         self.nodes_per_shape = nodes_per_shape
         self.scaling = scaling
+        self.moments = moments
         self.n_init = n_init
         self.random_state = random_state
 
@@ -154,28 +179,32 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         random = check_random_state(self.random_state)
         raw, unit = _draw(iterate_bands(X), self.nodes_per_shape, random)
         self.n_maps_ = tuple(samples[0].shape[1] for samples in raw)
-        self.normalisations_, self.vocabularies_ = [], []
+        self.normalisations_, self.vocabularies_, self.spreads_ = [], [], []
         for band in range(len(raw)):
             normal = self._normalisation(raw[band], unit[band])
             # At unit rms over its own shape, a sample has only the affine part before it.
-            nodes = (np.concatenate(unit[band]) - normal.mean) @ normal.transform
+            nodes = ((np.concatenate(unit[band]) - normal.mean) @ normal.transform).astype(np.float32)
             seed = random.randint(np.iinfo(np.int32).max)
-            words = Vocabulary(self.n_centers, n_init=self.n_init, random_state=seed)
+            words = Vocabulary(self.n_centers, n_init=self.n_init, random_state=seed).fit(nodes)
             self.normalisations_.append(normal)
-            self.vocabularies_.append(words.fit(nodes.astype(np.float32)))
+            self.vocabularies_.append(words)
+            self.spreads_.append(sum_residuals(nodes, words.cluster_centers_).spreads)
         return self
 
     def transform(self, X: Iterable[Any]) -> NDArray[np.float64]:
         """Return the codes of the shapes `X`, ``(n_shapes, n_code)``, each of unit L2 norm."""
         check_is_fitted(self)
         centers = [words.cluster_centers_ for words in self.vocabularies_]
+        spreads = self.spreads_ if self.moments == 2 else None
         shapes = iterate_bands(X, self.n_maps_)
-        return np.stack([encode(bands, self.normalisations_, centers, self.power) for bands in shapes])
+        return np.stack(
+            [encode(bands, self.normalisations_, centers, self.power, spreads) for bands in shapes]
+        )
 
     @property
     def _n_features_out(self) -> int:
         """Length of a code, as the naming of the columns asks for it."""
-        return sum(words.cluster_centers_.size for words in self.vocabularies_)
+        return int(self.moments * sum(words.cluster_centers_.size for words in self.vocabularies_))
 
     def __sklearn_tags__(self) -> Any:
         """Declare that the entries of the input may have any length, in two or three dimensions."""
@@ -187,6 +216,8 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         self, raw: Sequence[NDArray[np.floating]], unit: Sequence[NDArray[np.floating]]
     ) -> Normalisation:
         """Learn the normalisation of one band from samples as given and at unit rms."""
+        if self.scaling == "standard":
+            return Normalisation.standard(unit)
         if self.scaling == "whiten":
             return Normalisation.whitening(unit)
         if self.scaling == "deviation":
@@ -197,6 +228,9 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         """Refuse parameters out of their range."""
         if self.scaling not in get_args(Scaling):
             msg = f"scaling={self.scaling!r} must be one of {', '.join(get_args(Scaling))}"
+            raise ParameterError(msg)
+        if self.moments not in (1, 2):
+            msg = f"moments={self.moments} must be 1 or 2"
             raise ParameterError(msg)
         if not 0 <= self.power <= 1:
             msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"

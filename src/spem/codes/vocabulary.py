@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -15,7 +16,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from spem.errors import ParameterError
 
 
-@njit(cache=True, nogil=True, fastmath={"contract"})  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def _nearest(features: NDArray[Any], columns: NDArray[Any], labels: NDArray[np.int32]) -> None:
     """Write the index of each row's nearest centre; centres are columns, so that they are the lanes."""
     n_features, n_centers = columns.shape
@@ -33,18 +34,23 @@ def _nearest(features: NDArray[Any], columns: NDArray[Any], labels: NDArray[np.i
         labels[i] = best
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _accumulate(
     features: NDArray[Any],
     centers: NDArray[Any],
     labels: NDArray[np.int32],
+    counts: NDArray[np.int64],
     sums: NDArray[np.float64],
+    squares: NDArray[np.float64],
 ) -> None:
-    """Add each row's difference from its centre to that centre's sum."""
+    """Add each row's difference from its centre, and its square, to what that centre has."""
     for i in range(features.shape[0]):
         c = labels[i]
+        counts[c] += 1
         for j in range(features.shape[1]):
-            sums[c, j] += np.float64(features[i, j]) - centers[c, j]
+            difference = np.float64(features[i, j]) - centers[c, j]
+            sums[c, j] += difference
+            squares[c, j] += difference * difference
 
 
 def nearest_centers(features: NDArray[np.floating], centers: NDArray[np.floating]) -> NDArray[np.int32]:
@@ -73,8 +79,36 @@ def nearest_centers(features: NDArray[np.floating], centers: NDArray[np.floating
     return labels
 
 
-def residual_sums(features: NDArray[np.floating], centers: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Sum, for each centre, the differences of the nodes assigned to it from it (5.2).
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """What the nodes of one shape differ from their centres by, summed centre by centre.
+
+    Parameters
+    ----------
+    counts
+        ``(n_centers,)`` number of nodes assigned to each centre.
+    sums
+        ``(n_centers, n_features)`` sums R of the differences (5.2).
+    squares
+        ``(n_centers, n_features)`` sums of the squared differences.
+    """
+
+    counts: NDArray[np.int64]
+    sums: NDArray[np.float64]
+    squares: NDArray[np.float64]
+
+    def excess(self, spreads: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Return how far the squares exceed those of as many nodes of mean square `spreads`."""
+        return np.asarray(self.squares - self.counts[:, None] * spreads)
+
+    @property
+    def spreads(self) -> NDArray[np.float64]:
+        """``(n_centers, n_features)`` mean squared difference; zero for a centre without a node."""
+        return np.asarray(self.squares / np.maximum(self.counts, 1)[:, None])
+
+
+def sum_residuals(features: NDArray[np.floating], centers: NDArray[np.floating]) -> Residuals:
+    """Sum, for each centre, the differences of the nodes assigned to it from it (5.2), and their squares.
 
     Parameters
     ----------
@@ -85,20 +119,19 @@ def residual_sums(features: NDArray[np.floating], centers: NDArray[np.floating])
 
     Returns
     -------
-    NDArray
-        ``(n_centers, n_features)`` sums in float64; zero for a centre without a node.
+    Residuals
+        Counts, sums and sums of squares; zero for a centre without a node.
 
     Examples
     --------
-    >>> residual_sums(np.array([[0.0], [0.5], [2.0]]), np.array([[0.0], [1.5], [9.0]]))
-    array([[0.5],
-           [0.5],
-           [0. ]])
+    >>> found = sum_residuals(np.array([[0.0], [0.5], [2.0]]), np.array([[0.0], [1.5], [9.0]]))
+    >>> found.sums.ravel(), found.squares.ravel()
+    (array([0.5, 0.5, 0. ]), array([0.25, 0.25, 0.  ]))
     """
     rows = np.ascontiguousarray(features)
-    sums = np.zeros(centers.shape)
-    _accumulate(rows, centers, nearest_centers(rows, centers), sums)
-    return sums
+    counts, sums, squares = np.zeros(len(centers), np.int64), np.zeros(centers.shape), np.zeros(centers.shape)
+    _accumulate(rows, centers, nearest_centers(rows, centers), counts, sums, squares)
+    return Residuals(counts, sums, squares)
 
 
 class Vocabulary(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # type: ignore[misc]
