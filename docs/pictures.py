@@ -1,0 +1,45 @@
+"""Draw the pictures of the README from synthetic shapes: python docs/pictures.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import spem
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from spem.plots.figures import figure_fields, figure_maps
+from spem.plots.profiles import draw_basis, draw_profiles
+from spem.shapes.creatures import creature
+
+FOLDER = Path(__file__).parent / "images"
+
+
+def save(figure: Figure, name: str) -> None:
+    """Write a figure to the folder of pictures."""
+    FigureCanvasAgg(figure)
+    figure.savefig(FOLDER / name, dpi=110, bbox_inches="tight")
+
+
+def main() -> None:
+    """Draw every picture."""
+    FOLDER.mkdir(exist_ok=True)
+    flat = creature("hand", voxels=9_000, rng=np.random.default_rng(4))
+    solid = creature("dog", ndim=3, voxels=40_000, rng=np.random.default_rng(2))
+    field = spem.sweep(flat)
+    rho = np.array([0.03, 0.06, 0.12, 0.25]) * flat.size
+    save(figure_fields(flat, field.at(rho), [f"ρ = {r:.2g}" for r in rho], columns=4), "fields.png")
+    save(figure_maps(spem.maps(field), columns=6), "maps.png")
+    save(figure_maps(spem.maps(solid), columns=3), "maps-3d.png")
+
+    profiles = Figure(figsize=(9, 3), layout="constrained")
+    left, middle, right = profiles.subplots(1, 3)
+    depth = np.argsort(field.at(float(rho[2])))
+    nodes = depth[(np.array([0.0, 0.35, 0.6, 0.8, 0.95]) * (flat.n_nodes - 1)).astype(int)]
+    draw_profiles(field, nodes, middle, shape_ax=left)
+    draw_basis(spem.maps(field, n_maps=4), right)
+    save(profiles, "profiles.png")
+
+
+if __name__ == "__main__":
+    main()
