@@ -6,9 +6,9 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from _table import Benchmark, data_root
 
 import spem
+from _table import Benchmark, data_root
 from spem.shapes.creatures import creature
 from spem.shapes.meshes import mesh_shape
 from spem.shapes.shape import Shape
@@ -26,13 +26,15 @@ def made(quick: bool) -> Factories:
     shapes: Factories = {
         "disk, 1k": lambda: spem.synthetic.disk(18.0, 1.0, offset=0.31),
         "comb, 2k": comb,
+    }
+    if quick:
+        return shapes
+    return shapes | {
         "ant 2-D, 6k": lambda: creature("ant", voxels=6000, rng=chance(1)),
         "ball, 15k": lambda: ball(15_000),
         "ant 3-D, 15k": lambda: creature("ant", ndim=3, voxels=15_000, rng=chance(2)),
+        "ball, 250k": lambda: ball(250_000),
     }
-    if not quick:
-        shapes["ball, 250k"] = lambda: ball(250_000)
-    return shapes
 
 
 def real(benchmark: Benchmark) -> Factories:

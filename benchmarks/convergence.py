@@ -12,12 +12,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from _shapes import meshed, round_mesh
-from _table import Benchmark, Row, slope
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
 import spem
+from _shapes import meshed, round_mesh
+from _table import Benchmark, Row, slope
 from spem.shapes.closed_forms import ball_field
 from spem.shapes.shape import Shape
 

@@ -1,0 +1,72 @@
+"""Each benchmark runs on small sizes, and says what it could not run."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[1] / "benchmarks"
+KEYS = {"benchmark", "quick", "machine", "facts", "tables", "targets", "skipped"}
+WITHOUT_DATA = ("convergence", "solvers", "startup", "sweep_accuracy", "sweep_scaling")
+
+
+def _run(name: str, out: Path, **environment: str) -> dict:
+    command = [sys.executable, str(FOLDER / f"{name}.py"), "--quick", "--out", str(out)]
+    done = subprocess.run(command, env=os.environ | environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", WITHOUT_DATA)
+def test_benchmark_runs_without_data(name, tmp_path):
+    """A quick run without real shapes writes its tables, and names what it skipped."""
+    result = _run(name, tmp_path, SPEM_DATA=str(tmp_path / "absent"))
+    assert set(result) == KEYS
+    assert result["benchmark"] == name
+    assert result["quick"] is True
+    assert result["machine"]["cores"] >= 1
+    assert result["tables"]
+    assert all(rows for rows in result["tables"].values())
+    assert not any("shrec11" in title or "tari1000" in title for title in result["tables"])
+
+
+def test_collections_are_skipped_without_data(tmp_path):
+    """Without real collections there is no figure, only the reasons."""
+    result = _run("collection", tmp_path, SPEM_DATA=str(tmp_path / "absent"))
+    assert result["tables"] == {}
+    assert result["targets"] == []
+    assert [reason.split(":")[0] for reason in result["skipped"]] == ["tari1000", "shrec11"]
+
+
+@pytest.mark.skipif(importlib.util.find_spec("pyamg") is None, reason="pyamg is not installed")
+def test_speed_compares_with_every_hierarchy(tmp_path):
+    """Each hierarchy of pyamg that is tried stands in the table, with the residual that it reached."""
+    result = _run("sweep_speed", tmp_path, SPEM_DATA=str(tmp_path / "absent"))
+    assert set(result) == KEYS
+    assert any("shrec11" in reason for reason in result["skipped"])
+    [rows] = result["tables"].values()
+    peers = [row for row in rows if row["method"].startswith("pyamg")]
+    assert len(peers) == 5
+    assert all(row["residual"] < 1e-7 for row in peers)
+
+
+def test_speed_without_a_peer_says_so(tmp_path):
+    """Where pyamg is not installed the other methods are timed and no ratio to it is given."""
+    hidden = tmp_path / "hidden"
+    hidden.mkdir()
+    (hidden / "sitecustomize.py").write_text(
+        "import importlib.util as u\nfind = u.find_spec\n"
+        "u.find_spec = lambda name, *rest: None if name == 'pyamg' else find(name, *rest)\n",
+        encoding="utf-8",
+    )
+    paths = os.pathsep.join([str(hidden), os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
+    result = _run("sweep_speed", tmp_path, SPEM_DATA=str(tmp_path / "absent"), PYTHONPATH=paths)
+    assert any("pyamg" in reason for reason in result["skipped"])
+    methods = {row["method"] for rows in result["tables"].values() for row in rows}
+    assert not any("pyamg" in method for method in methods)
