@@ -18,7 +18,7 @@ from spem.errors import ParameterError, SpemError
 
 _KIND = "work"
 # Settings that change codes but not the features that they are made of.
-_LATER = ("n_centers", "power", "scaling", "nodes_per_shape", "seed")
+_LATER = ("n_centers", "power", "scaling", "moments", "nodes_per_shape", "seed")
 
 
 @dataclass(frozen=True)
