@@ -32,9 +32,19 @@ app = typer.Typer(
 )
 
 
+def _print_version(wanted: bool) -> None:
+    """Print the version, and do nothing else."""
+    if wanted:
+        typer.echo(f"spem {__version__}")
+        raise typer.Exit
+
+
 @app.callback()
 def _spem(
-    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
+    ] = False,
 ) -> None:
     """Screened Poisson hyperfields: fields, SPEM maps, codes and search for shapes of any dimension.
 
@@ -52,9 +62,6 @@ def _spem(
     Exit status: 0 all done; 1 some shapes failed, the others are saved; 2 wrong usage, or nothing could be
     done; 130 interrupted.
     """  # noqa: D301
-    if version:
-        typer.echo(f"spem {__version__}")
-        raise typer.Exit
 
 
 def guarded(function: Callable[..., None]) -> Callable[..., None]:
@@ -67,12 +74,8 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
 
     Examples
     --------
-    >>> def fail() -> None:
-    ...     raise SpemError("no such shape")
-    >>> guarded(fail)()
-    Traceback (most recent call last):
-        ...
-    click.exceptions.Exit: 2
+    >>> guarded(lambda: typer.echo("done"))()
+    done
     """
 
     @functools.wraps(function)

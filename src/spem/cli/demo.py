@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 # Enough for scores that mean something, and for a minute on two cores.
 CREATURES_PER_CLASS = 5
+KINDS: tuple[str, ...] | None = None
 VOXELS = 8000
 ANSWERS = 5
 RHO = [0.05, 0.1, 0.2, 0.4]
@@ -41,7 +42,8 @@ def demo(
 
     from spem.shapes.creatures import write_collection
 
-    folders = write_collection(folder, n_per_class=CREATURES_PER_CLASS, rng=np.random.default_rng(seed))
+    rng = np.random.default_rng(seed)
+    folders = write_collection(folder, n_per_class=CREATURES_PER_CLASS, kinds=KINDS, rng=rng)
     written: list[Path] = []
     facts: dict[str, Any] = {}
     for shapes in folders:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from typing import TypeVar
 
 from joblib import Parallel, delayed, parallel_config
@@ -14,6 +18,8 @@ from spem.errors import ParameterError, SpemError
 
 T = TypeVar("T")
 R = TypeVar("R")
+# Seconds between two looks of a worker at its parent.
+_PARENT_CHECK = 0.5
 
 
 def one_line(error: BaseException) -> str:
@@ -91,7 +97,21 @@ def _spread(work: Callable[[T], R], tasks: dict[int, T], n_jobs: int) -> Iterato
 def _in_process(work: Callable[[T], R], index: int, task: T) -> tuple[int, R | None, str]:
     """Run one task in a worker. Ctrl-C reaches all processes; the parent ends the workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _follow_parent()
     return index, *_attempt(work, task)
+
+
+@cache
+def _follow_parent() -> None:
+    """Once in a process: watch the parent, and end when it is gone, since nobody waits for the results."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_PARENT_CHECK)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _attempt(work: Callable[[T], R], task: T) -> tuple[R | None, str]:

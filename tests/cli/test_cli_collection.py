@@ -1,0 +1,265 @@
+"""encode, search, evaluate, demo: exit statuses, files, resumption after Ctrl-C and kill -9."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import Result
+
+from spem.codes.codes import Codes
+from spem.codes.container import read_container, write_container
+
+Spem = Callable[..., Result]
+Start = Callable[..., subprocess.Popen[str]]
+
+N_MANY = 80
+QUICK = ("--own-grid", "--n-maps", "3", "--n-centers", "4", "--n-rho", "16")
+
+
+def ellipse(a: float, b: float, half: int = 18) -> np.ndarray:
+    """Return the mask of an ellipse with semi-axes `a` and `b`."""
+    y, x = np.mgrid[-half : half + 1, -half : half + 1]
+    return (x / a) ** 2 + (y / b) ** 2 < 1
+
+
+def test_encode_writes_codes(spem: Spem, folder: Path, tmp_path: Path) -> None:
+    """All shapes of a folder get codes; what is told as JSON is what is in the file."""
+    target = tmp_path / "deep" / "codes.spem"
+    result = spem("encode", folder, "-o", target, *QUICK, "--json", "--seed", "3")
+    assert result.exit_code == 0, result.stderr
+    facts, codes = json.loads(result.stdout), Codes.load(target)
+    assert (facts["n_shapes"], facts["n_failed"]) == (9, 0)
+    assert facts["model"] == codes.model.digest
+    assert (codes.model.settings.seed, codes.model.settings.voxels) == (3, None)
+    assert not target.with_name("codes.spem.work").exists()
+
+
+def test_encode_tells_failures_and_saves_the_rest(spem: Spem, folder: Path, tmp_path: Path) -> None:
+    """One line a failed file, exit status 1, codes of the others."""
+    (folder / "broken.npy").write_bytes(b"")
+    result = spem("encode", folder, "-o", tmp_path / "c.spem", *QUICK)
+    assert result.exit_code == 1
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert "broken.npy" in result.stderr
+    assert len(Codes.load(tmp_path / "c.spem")) == 9
+
+
+def test_encode_of_nothing_readable(spem: Spem, tmp_path: Path) -> None:
+    """When no file gives a shape nothing is written, exit status 2."""
+    (tmp_path / "broken.npy").write_bytes(b"")
+    result = spem("encode", tmp_path / "broken.npy", "-o", tmp_path / "c.spem")
+    assert result.exit_code == 2
+    assert "no shape could be read" in result.stderr
+    assert not (tmp_path / "c.spem").exists()
+
+
+def test_encode_adds_to_codes(spem: Spem, folder: Path, codes: Path) -> None:
+    """New files join codes that are there, with their vocabulary; old rows stay as they are."""
+    before = Codes.load(codes)
+    np.save(folder.parent / "extra.npy", ellipse(6, 12))
+    result = spem("encode", folder.parent / "extra.npy", "-o", codes)
+    assert result.exit_code == 0, result.stderr
+    after = Codes.load(codes)
+    assert after.names == (*before.names, "extra")
+    assert after.model.digest == before.model.digest
+    np.testing.assert_array_equal(after.vectors[:-1], before.vectors)
+
+
+def test_encode_refuses_other_settings_for_codes_there(spem: Spem, folder: Path, codes: Path) -> None:
+    """Settings that contradict the codes are named; --overwrite makes them anew."""
+    result = spem("encode", folder, "-o", codes, "--n-maps", "2")
+    assert result.exit_code == 2
+    assert "n_maps=2" in result.stderr
+    done = spem("encode", folder, "-o", codes, "--overwrite", *QUICK, "--n-maps", "2")
+    assert done.exit_code == 0, done.stderr
+    assert Codes.load(codes).model.settings.n_maps == 2
+
+
+def test_vocabulary_is_saved_and_reused(spem: Spem, folder: Path, codes: Path, tmp_path: Path) -> None:
+    """A model file and the codes it came with give the same codes."""
+    first, second, model = tmp_path / "a.spem", tmp_path / "b.spem", tmp_path / "model.spem"
+    assert (
+        spem("encode", folder, "-o", first, "--vocabulary", codes, "--save-vocabulary", model).exit_code == 0
+    )
+    assert spem("encode", folder, "-o", second, "--vocabulary", model).exit_code == 0
+    np.testing.assert_array_equal(Codes.load(second).vectors, Codes.load(codes).vectors)
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("--rho-range", "3"), "LOW:HIGH"),
+        (("--rho-range", "0.3:0.1"), "LOW < HIGH"),
+        (("--vocabulary", "none.spem"), "none.spem"),
+        (("--power", "3"), "power=3"),
+        (("--device", "cuda"), "cuda"),
+    ],
+)
+def test_encode_refuses_bad_options(spem: Spem, folder: Path, options: tuple[str, str], word: str) -> None:
+    """Options out of range are named."""
+    result = spem("encode", folder, "-o", folder / "c.spem", *options)
+    assert result.exit_code == 2
+    assert word in result.stderr
+
+
+def test_search_ranks(spem: Spem, folder: Path, codes: Path) -> None:
+    """A file of the collection finds itself first, by path or by name, then its class."""
+    answers = json.loads(spem("search", codes, folder / "long1.npy", "-k", "3", "--json").stdout)
+    assert [answer["rank"] for answer in answers] == [1, 2, 3]
+    assert answers[0]["name"] == "long1"
+    assert answers[0]["distance"] == pytest.approx(0, abs=1e-9)
+    assert set(answers[0]) == {"rank", "name", "path", "distance"}
+    assert "long1" in spem("search", codes, "long1").stdout.splitlines()[1]
+
+
+def test_search_by_a_new_file(spem: Spem, codes: Path, tmp_path: Path) -> None:
+    """A file that is not of the collection is coded with its model."""
+    np.save(tmp_path / "new.npy", ellipse(11, 11.5))
+    result = spem("search", codes, tmp_path / "new.npy", "--json")
+    assert json.loads(result.stdout)[0]["name"].startswith("round")
+
+
+@pytest.mark.parametrize(("query", "word"), [("nobody", "no such file or coded shape"), ("", "folder")])
+def test_search_refuses_bad_queries(spem: Spem, codes: Path, query: str, word: str, tmp_path: Path) -> None:
+    """A query that is neither a file nor a name is refused."""
+    result = spem("search", codes, query or tmp_path)
+    assert result.exit_code == 2
+    assert word in result.stderr or "no such" in result.stderr
+
+
+def test_codes_of_another_version(spem: Spem, codes: Path) -> None:
+    """Codes of another version of the method are refused, with what to do."""
+    header, arrays = read_container(codes, "codes")
+    header["settings"]["code_format"] += 1
+    write_container(codes, "codes", header, arrays)
+    result = spem("search", codes, "long1")
+    assert result.exit_code == 2
+    assert "upgrade spem" in result.stderr
+
+
+def test_truncated_codes(spem: Spem, codes: Path) -> None:
+    """Codes that are cut short are refused."""
+    codes.write_bytes(codes.read_bytes()[:300])
+    result = spem("search", codes, "long1")
+    assert result.exit_code == 2
+    assert "truncated" in result.stderr
+
+
+def test_adding_with_another_vocabulary(spem: Spem, folder: Path, codes: Path, tmp_path: Path) -> None:
+    """A vocabulary that is not the one of the codes there is refused."""
+    other = tmp_path / "other.spem"
+    assert spem("encode", folder, "-o", other, *QUICK, "--seed", "9").exit_code == 0
+    result = spem("encode", folder, "-o", codes, "--vocabulary", other)
+    assert result.exit_code == 2
+    assert "another vocabulary" in result.stderr
+
+
+def test_evaluate_scores(spem: Spem, folder: Path, codes: Path, tmp_path: Path) -> None:
+    """Scores in percent, on stdout for people and as JSON in a file, and a report."""
+    options = ("--json", tmp_path / "s.json", "--report", tmp_path / "report")
+    result = spem("evaluate", codes, "--labels", folder / "labels.csv", *options)
+    assert result.exit_code == 0, result.stderr
+    facts = json.loads((tmp_path / "s.json").read_text())
+    assert {"NN", "FT", "ST", "E", "DCG", "n_shapes", "n_classes", "per_class"} <= set(facts)
+    assert (facts["n_shapes"], facts["n_classes"]) == (9, 3)
+    assert facts["NN"] > 80
+    assert "9 shapes in 3 classes" in result.stdout
+    page = (tmp_path / "report" / "report.html").read_text()
+    assert "round0" in page
+    assert "data:image/png" in page
+
+
+def test_evaluate_writes_json_to_stdout(spem: Spem, folder: Path, codes: Path) -> None:
+    """--json - writes nothing but JSON to stdout."""
+    result = spem("evaluate", codes, "--labels", folder / "labels.csv", "--json", "-")
+    assert json.loads(result.stdout)["n_classes"] == 3
+
+
+@pytest.mark.parametrize(
+    ("edit", "status", "word"),
+    [
+        (lambda rows: rows[:-2], 2, "2 of 9 shapes have no label"),
+        (lambda rows: [*rows, "ghost.npy,ghost"], 0, "such as ghost.npy"),
+        (lambda rows: [*rows[:-1], "oval2.npy,lonely"], 0, "alone in their class"),
+        (
+            lambda rows: [f"{row.split(',')[0]},c{i}" if i else row for i, row in enumerate(rows)],
+            2,
+            "two shapes",
+        ),
+        (lambda _: [""], 2, "no label found"),
+    ],
+)
+def test_labels_that_do_not_fit(
+    spem: Spem, folder: Path, codes: Path, edit: Callable[[list[str]], list[str]], status: int, word: str
+) -> None:
+    """Missing labels are an error; labels without a shape and classes of one are told."""
+    table = folder / "labels.csv"
+    table.write_text("\n".join(edit(table.read_text().splitlines())) + "\n")
+    result = spem("evaluate", codes, "--labels", table)
+    assert result.exit_code == status
+    assert word in result.stderr
+
+
+def _many(tmp_path: Path) -> Path:
+    """Write shapes that take a few seconds to encode."""
+    shapes = tmp_path / "many"
+    shapes.mkdir()
+    for i in range(N_MANY):
+        np.save(shapes / f"s{i:02d}.npy", ellipse(60 + i, 150 - i / 2, 155))
+    return shapes
+
+
+def _wait_for(work: Path, count: int, process: subprocess.Popen[str]) -> None:
+    """Wait until so many shapes are done."""
+    deadline = time.monotonic() + 60
+    while len(list(work.rglob("[0-9a-f]*.work"))) < count:
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def test_stopped_encode_goes_on(start: Start, spem: Spem, tmp_path: Path) -> None:
+    """After kill -9 and after Ctrl-C the same command goes on; the codes are those of one run."""
+    shapes = _many(tmp_path)
+    target, work = tmp_path / "c.spem", tmp_path / "c.spem.work"
+    options = ("--n-maps", 3, "--n-centers", 4, "--voxels", 9000, "-j", 2)
+    with start("encode", shapes, "-o", target, *options) as first:
+        _wait_for(work, 5, first)
+        os.kill(first.pid, signal.SIGKILL)
+        first.communicate(timeout=30)
+    done = len(list(work.rglob("[0-9a-f]*.work")))
+    assert 5 <= done < N_MANY
+    with start("encode", shapes, "-o", target, *options) as second:
+        _wait_for(work, done + 5, second)
+        os.killpg(second.pid, signal.SIGINT)
+        _, said = second.communicate(timeout=30)
+    assert second.returncode == 130
+    assert "are done already; going on" in said
+    assert "give the same command again" in said
+    assert len(said.strip().splitlines()) == 2, said
+    third = spem("encode", shapes, "-o", target, *options[:-1], 1)
+    assert third.exit_code == 0, third.stderr
+    assert done + 5 <= int(third.stderr.split()[1]) < N_MANY
+    assert not work.exists()
+    assert spem("encode", shapes, "-o", tmp_path / "whole.spem", *options[:-1], 1).exit_code == 0
+    np.testing.assert_array_equal(Codes.load(target).vectors, Codes.load(tmp_path / "whole.spem").vectors)
+
+
+def test_demo(spem: Spem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`demo` leaves collections, codes, pictures and reports, and says where."""
+    monkeypatch.setattr("spem.cli.demo.CREATURES_PER_CLASS", 2)
+    monkeypatch.setattr("spem.cli.demo.VOXELS", 1500)
+    monkeypatch.setattr("spem.cli.demo.KINDS", ("fish", "starfish"))
+    result = spem("demo", tmp_path / "d")
+    assert result.exit_code == 0, result.output
+    for name in ("images.spem", "meshes.spem", "images-maps.png", "meshes-fields.png", "meshes-report.html"):
+        assert (tmp_path / "d" / name).stat().st_size > 1000
+    assert "meshes-report.html" in result.stdout

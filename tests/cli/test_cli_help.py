@@ -1,0 +1,62 @@
+"""Help: every command has it, with examples, and it is quick."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+from typer.testing import Result
+
+import spem as package
+
+COMMANDS = ("info", "field", "maps", "encode", "search", "evaluate", "demo")
+HEAVY = (
+    "numba",
+    "scipy",
+    "sklearn",
+    "skimage",
+    "matplotlib",
+    "trimesh",
+    "igl",
+    "nibabel",
+    "joblib",
+    "tifffile",
+)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_an_example(spem: Callable[..., Result], command: str) -> None:
+    """The help of a command shows it in use."""
+    result = spem(command, "--help")
+    assert result.exit_code == 0
+    assert "Examples:" in result.stdout
+    assert f"  spem {command}" in result.stdout
+
+
+def test_help_names_all_commands(spem: Callable[..., Result]) -> None:
+    """`spem --help` lists the commands; without arguments the same is shown as wrong usage."""
+    text = spem("--help").stdout
+    assert all(command in text for command in COMMANDS)
+    assert spem().exit_code == 2
+
+
+def test_version(spem: Callable[..., Result]) -> None:
+    """`spem --version` is the package's."""
+    assert spem("--version").stdout.strip() == f"spem {package.__version__}"
+
+
+def test_help_loads_nothing_heavy() -> None:
+    """The command line starts without the numerical libraries."""
+    script = f"import sys, spem.cli.app; print([name for name in {HEAVY!r} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_runs_as_a_module() -> None:
+    """`python -m spem` is the command line, and a closed pipe ends it quietly."""
+    script = f"{sys.executable} -m spem --help | head -n 1"
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("Usage:")
+    assert done.stderr == ""

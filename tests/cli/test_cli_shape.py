@@ -1,0 +1,115 @@
+"""info, field and maps: what they print, what they write, and that it fits the equation."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import Result
+
+Spem = Callable[..., Result]
+
+
+def test_info_tells_what_was_read(spem: Spem, image: Path) -> None:
+    """`info` prints the facts about a shape for people, and the same as JSON."""
+    facts = json.loads(spem("info", image, "--json").stdout)
+    text = spem("info", image).stdout
+    assert facts["dimensions"] == 2
+    assert facts["spacing"] == [1.0, 1.0]
+    assert f"{facts['voxels']}" in text
+    assert set(facts) >= {"name", "method", "components", "repairs", "watertight", "volume", "default_rho"}
+
+
+def test_info_tells_repairs_on_stderr(spem: Spem, tmp_path: Path) -> None:
+    """A dropped speck is told in the facts and on stderr."""
+    mask = np.zeros((9, 9), bool)
+    mask[1:5, 1:5], mask[7, 7] = True, True
+    np.save(tmp_path / "speck.npy", mask)
+    result = spem("info", tmp_path / "speck.npy", "--json")
+    assert "kept the largest of 2 components" in json.loads(result.stdout)["repairs"][0]
+    assert "kept the largest of 2 components" in result.stderr
+    kept = spem("info", tmp_path / "speck.npy", "--json", "--components", "all")
+    assert json.loads(kept.stdout)["voxels"] == 17
+
+
+def test_field_writes_points_and_values(spem: Spem, image: Path, tmp_path: Path) -> None:
+    """`field` writes one row a node and one column a ρ, on the image's own grid; inf gives one everywhere."""
+    target = tmp_path / "new" / "f.npz"
+    result = spem("field", image, "--rho", "2", "--rho", "inf", "-o", target, "--json")
+    assert result.exit_code == 0, result.stderr
+    with np.load(target) as found:
+        assert set(found) == {"points", "values", "rho", "spacing"}
+        assert found["points"].shape == (found["values"].shape[0], 2)
+        np.testing.assert_array_equal(found["rho"], [2, np.inf])
+        assert found["values"].shape[1] == 2
+        assert 0 < found["values"][:, 0].min() < found["values"][:, 0].max() < 1
+        np.testing.assert_allclose(found["values"][:, 1], 1, atol=1e-9)
+        np.testing.assert_array_equal(found["points"] % 1, 0)
+    summary = json.loads(result.stdout)
+    assert summary["rho"] == [2.0, "inf"]
+    assert summary["output"] == str(target)
+
+
+def test_field_of_a_mesh_takes_the_voxel_budget(spem: Spem, mesh: Path, tmp_path: Path) -> None:
+    """A mesh has about as many voxels as asked for, in the mesh's own coordinates."""
+    result = spem("field", mesh, "--rho", "0.5", "--voxels", "3000", "-o", tmp_path / "f.npz")
+    assert result.exit_code == 0, result.stderr
+    with np.load(tmp_path / "f.npz") as found:
+        assert 2700 < len(found["points"]) < 3300
+        assert (found["points"] > 0).all()
+        assert (found["points"] < [2, 3, 4]).all()
+
+
+@pytest.mark.parametrize("grid", [("--spacing", "0.2"), ("--inner-radius", "6")])
+def test_grid_options(spem: Spem, mesh: Path, grid: tuple[str, str]) -> None:
+    """The spacing and the inner radius choose the grid."""
+    facts = json.loads(spem("info", mesh, "--json", *grid).stdout)
+    spacing = 0.2 if grid[0] == "--spacing" else 1 / 6
+    assert facts["spacing"] == pytest.approx([spacing] * 3, rel=0.1)
+
+
+def test_boundary_voxel_lowers_the_field(spem: Spem, image: Path, tmp_path: Path) -> None:
+    """With v = 1 on the voxels outside, the boundary is farther off."""
+    for boundary in ("surface", "voxel"):
+        target = tmp_path / f"{boundary}.npz"
+        assert spem("field", image, "--rho", "3", "--boundary", boundary, "-o", target).exit_code == 0
+    with np.load(tmp_path / "surface.npz") as near, np.load(tmp_path / "voxel.npz") as far:
+        assert (far["values"] < near["values"]).all()
+
+
+def test_maps_write_basis_and_variance(spem: Spem, image: Path, tmp_path: Path) -> None:
+    """`maps` writes maps, an orthonormal basis and variances that fit each other."""
+    target = tmp_path / "m.npz"
+    options = ("--n-maps", "3", "--rho-min", "1", "--rho-max", "8", "--n-rho", "20", "--rho-scheme", "log")
+    result = spem("maps", image, *options, "--device", "cpu", "-o", target, "--json")
+    assert result.exit_code == 0, result.stderr
+    with np.load(target) as found:
+        assert set(found) == {"points", "maps", "basis", "variance", "rho", "spacing"}
+        assert found["maps"].shape == (len(found["points"]), 3)
+        np.testing.assert_allclose(found["basis"].T @ found["basis"], np.eye(3), atol=1e-9)
+        np.testing.assert_allclose((found["maps"] ** 2).mean(axis=0), found["variance"], rtol=1e-3)
+        np.testing.assert_allclose(found["rho"], np.geomspace(1, 8, 20))
+    assert json.loads(result.stdout)["n_maps"] == 3
+
+
+@pytest.mark.parametrize("command", [("field", "--rho", "3"), ("maps", "--n-maps", "2")])
+def test_pictures_need_no_arrays(spem: Spem, image: Path, tmp_path: Path, command: tuple[str, ...]) -> None:
+    """A picture is written alone when no array file is asked for."""
+    result = spem(command[0], image, *command[1:], "--plot", tmp_path / "p.png")
+    assert result.exit_code == 0, result.stderr
+    assert (tmp_path / "p.png").read_bytes()[:4] == b"\x89PNG"
+    assert [p.name for p in tmp_path.iterdir()] == ["p.png"]
+
+
+def test_label_and_polarity_options(spem: Spem, tmp_path: Path, image: Path) -> None:
+    """--label takes one label of a volume, --dark the ground of a bright shape."""
+    np.save(tmp_path / "labels.npy", [[0, 3, 3, 0, 7], [0, 3, 3, 0, 7]])
+    facts = json.loads(spem("info", tmp_path / "labels.npy", "--label", "3", "--json").stdout)
+    assert facts["voxels"] == 4
+    bright, dark = (
+        json.loads(spem("info", image, o, "--json").stdout)["voxels"] for o in ("--light", "--dark")
+    )
+    assert bright + dark == 37 * 37
