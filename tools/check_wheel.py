@@ -1,0 +1,36 @@
+"""Build the wheel, install it in an environment of its own, and start what it brings."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PROGRAM = "import spem; [getattr(spem, name) for name in spem.__all__]; print(spem.__file__)"
+
+
+def main() -> None:
+    """Exit with the status of the first step that fails."""
+    with tempfile.TemporaryDirectory() as folder:
+        here = Path(folder)
+        _run(sys.executable, "-m", "build", "--wheel", "--outdir", folder, ROOT)
+        (wheel,) = here.glob("*.whl")
+        venv.create(here / "venv", with_pip=True)
+        python = here / "venv" / "bin" / "python"
+        _run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
+        _run(python, "-I", "-c", PROGRAM, cwd=here)
+        _run(here / "venv" / "bin" / "spem", "--help", cwd=here)
+
+
+def _run(*command: str | Path, cwd: Path = ROOT) -> None:
+    """Run one step; its output is shown where it fails."""
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"{' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
+
+
+if __name__ == "__main__":
+    main()
