@@ -270,8 +270,6 @@ def _settings(settings: Settings | None, model: Model | None) -> Settings:
     if settings is not None and settings != model.settings:
         mine, theirs = settings.to_json(), model.settings.to_json()
         odd = [f"{key} {mine[key]} against {theirs[key]}" for key in mine if mine[key] != theirs[key]]
-        msg = (
-            f"the vocabulary was made with other settings ({'; '.join(odd)}); leave them out"
-        )
+        msg = f"the vocabulary was made with other settings ({'; '.join(odd)}); leave them out"
         raise ModelError(msg)
     return model.settings
