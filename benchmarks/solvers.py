@@ -135,8 +135,8 @@ def multi_shift(
 ) -> tuple[np.ndarray, int]:
     """Solve (A + s) x = b for all shifts by CG for the smallest one, whose residuals those of others follow.
 
-    Residuals are parallel, and the factors ζ between them come from the steps (Frommer and Maass 1999); a shift whose
-    residual is small enough is left alone.
+    Residuals are parallel, and the factors ζ between them come from the steps (Frommer and Maass 1999); a
+    shift whose residual is small enough is left alone.
     """
     order = np.argsort(shifts)
     base, offset = shifts[order[0]], (shifts - shifts[order[0]])[order]

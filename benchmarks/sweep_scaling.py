@@ -1,7 +1,8 @@
 """Time and memory of the sweep against the number of nodes: ``python benchmarks/sweep_scaling.py``.
 
-What is measured is 64 fields and 6 maps. Every size runs in its own process, so that its peak memory is its own. Bytes a node are what the peak of the
-process grew by during the sweep and the maps, without the shape (made before) and with it.
+What is measured is 64 fields and 6 maps. Every size runs in its own process, so that its peak memory is its
+own. Bytes a node are what the peak of the process grew by during the sweep and the maps, without the shape
+(made before) and with it.
 """
 
 from __future__ import annotations
