@@ -58,9 +58,11 @@ def rank(query: ArrayLike, codes: Codes, k: int | None = 10) -> list[Answer]:
     --------
     >>> from spem.codes.model import Model
     >>> from spem.codes.settings import Settings
-    >>> model = Model(Settings(n_maps=1, n_centers=3), (np.ones(1),), (np.zeros((3, 1), np.float32),))
-    >>> codes = Codes(("a", "b"), ("a.png", "b.png"), ("0", "1"), [[1, 0, 0], [0, 0, 1]], model)
-    >>> [(answer.rank, answer.name) for answer in rank([0, 0, 2], codes)]
+    >>> rng = np.random.default_rng(0)
+    >>> model = Model.fit(Settings(n_maps=2, n_centers=4), [rng.random((50, 2)) for _ in range(3)])
+    >>> vectors = np.eye(2, model.n_code)
+    >>> codes = Codes(("a", "b"), ("a.png", "b.png"), ("0", "1"), vectors, model)
+    >>> [(answer.rank, answer.name) for answer in rank(vectors[1], codes)]
     [(1, 'b'), (2, 'a')]
     """
     if k is not None and k < 1:
