@@ -103,7 +103,7 @@ def compute_maps(field: Hyperfield, n_maps: int = 6, *, centred: bool = False) -
     if not 1 <= n_maps <= field.rho.size:
         msg = f"n_maps={n_maps}: expected 1 to {field.rho.size}, the number of sampled rho"
         raise ParameterError(msg)
-    upper = np.linalg.cholesky(field.mass).T
+    upper = np.linalg.cholesky(field.gram).T
     small = upper @ field.coefficients()
     if centred:
         small[0] = 0.0  # the other columns are orthogonal to the constant

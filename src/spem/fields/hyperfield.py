@@ -34,10 +34,10 @@ class Hyperfield:
         ``(n_rho,)`` the sampled ρ, in the unit of the spacing.
     basis
         ``(n_nodes, rank)`` orthonormal columns, orthogonal to the constant.
-    mass
+    gram
         ``(rank + 1, rank + 1)`` inner products of the constant and the columns.
-    stiffness
-        ``(rank + 1, rank + 1)`` the operator A between them.
+    mass, stiffness
+        ``(rank + 1, rank + 1)`` the matrices M and A of the system between them.
     boundary
         Boundary model, ``"surface"`` or ``"voxel"``.
     error
@@ -56,6 +56,7 @@ class Hyperfield:
     shape: Shape
     rho: NDArray[np.float64]
     basis: NDArray[np.floating[Any]]
+    gram: NDArray[np.float64]
     mass: NDArray[np.float64]
     stiffness: NDArray[np.float64]
     boundary: str = "surface"
@@ -155,6 +156,6 @@ class Hyperfield:
 def galerkin(
     stiffness: NDArray[np.float64], mass: NDArray[np.float64], shifts: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Solve (K + s M) y = s M e, e the constant, for each s: deficits 1 - v in a basis, one column each."""
+    """Solve (A + s M) y = s M e, e the constant, for each s: deficits 1 - v in a basis, one column each."""
     s = shifts[:, None, None]
     return np.asarray(np.linalg.solve(stiffness + s * mass, s * mass[:, :1])[..., 0].T)

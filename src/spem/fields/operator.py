@@ -1,4 +1,4 @@
-"""The screened Poisson operator of one shape: (A + I/ρ²) v = b on its nodes."""
+"""The screened Poisson operator of one shape: (A + M/ρ²) v = b on its nodes."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ _DOMAINS = {"surface": surface_domain, "voxel": voxel_domain}
 class System:
     """The 2d+1-point discretisation of (1.1) with the boundary values eliminated.
 
-    Every ρ shares this system: its matrix is A + I/ρ² and its right-hand side b. A is a symmetric M-matrix
-    and A·1 = b.
+    Every ρ shares this system: its matrix is A + M/ρ² and its right-hand side b. A is a symmetric M-matrix
+    with A·1 = b, and M is diagonal: the identity for the ``voxel`` boundary.
 
     Parameters
     ----------
@@ -36,6 +36,10 @@ class System:
         ``(n_nodes,)`` b: sum of 1/(θ h²) over the boundary edges of each node.
     diagonal
         ``(n_nodes,)`` diagonal of A.
+    mass
+        ``(n_nodes,)`` diagonal of M: mean over the axes of the half length of the two edges of each node, in
+        edges. An edge that is cut short holds less of the screening. In 1-D this is exact; in general it
+        halves the error that the identity would leave, at the same order.
     boundary
         The boundary model.
     """
@@ -45,6 +49,7 @@ class System:
     weights: NDArray[np.float64]
     rhs: NDArray[np.float64]
     diagonal: NDArray[np.float64]
+    mass: NDArray[np.float64]
     boundary: Boundary
 
     @property
@@ -53,13 +58,13 @@ class System:
         return self.domain.n_nodes
 
     def matrix(self, shift: float = 0.0) -> scipy.sparse.csc_array:
-        """Assemble A + shift·I as a sparse matrix, rows and columns in node order."""
+        """Assemble A + shift·M as a sparse matrix, rows and columns in node order."""
         node, direction = np.nonzero(self.domain.neighbours < self.n_nodes)
         column = self.domain.neighbours[node, direction]
         off = scipy.sparse.csc_array(
             (-self.weights[direction // 2], (node, column)), shape=(self.n_nodes, self.n_nodes)
         )
-        return (off + scipy.sparse.diags_array(self.diagonal + shift)).tocsc()
+        return (off + scipy.sparse.diags_array(self.diagonal + shift * self.mass)).tocsc()
 
 
 def assemble(shape: Shape, boundary: Boundary = "surface") -> System:
@@ -94,4 +99,5 @@ def assemble(shape: Shape, boundary: Boundary = "surface") -> System:
     cut = weights[direction // 2]
     rhs = np.bincount(node, cut / domain.fraction, domain.n_nodes).astype(np.float64)
     diagonal = 2 * weights.sum() - np.bincount(node, cut, domain.n_nodes) + rhs
-    return System(shape, domain, weights, rhs, diagonal, boundary)
+    mass = 1 - np.bincount(node, 1 - domain.fraction, domain.n_nodes) / (2 * shape.ndim)
+    return System(shape, domain, weights, rhs, diagonal, mass, boundary)

@@ -48,6 +48,7 @@ def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
     shape, cuts = field.shape, field.shape.cuts
     arrays: dict[str, NDArray[Any]] = {
         "basis": field.basis,
+        "gram": field.gram,
         "mass": field.mass,
         "stiffness": field.stiffness,
         "rho": field.rho,
@@ -124,6 +125,7 @@ def _assemble(attributes: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Hy
         shape,
         arrays["rho"],
         arrays["basis"],
+        arrays["gram"],
         arrays["mass"],
         arrays["stiffness"],
         attributes["boundary"],

@@ -20,7 +20,7 @@ class ConjugateGradient:
     Parameters
     ----------
     rtol
-        Tolerance on ‖b - (A + I/ρ²) v‖ / ‖b‖.
+        Tolerance on ‖b - (A + M/ρ²) v‖ / ‖b‖.
     max_iterations
         Limit for each field.
     """
@@ -40,7 +40,7 @@ class ConjugateGradient:
         for r in rho:
             shift = 1.0 / r**2
             matrix = system.matrix(shift).tocsr()
-            jacobi = scipy.sparse.diags_array(1.0 / (system.diagonal + shift))
+            jacobi = scipy.sparse.diags_array(1.0 / matrix.diagonal())
             v, _ = scipy.sparse.linalg.cg(
                 matrix,
                 system.rhs,

@@ -35,7 +35,7 @@ class Direct:
     tolerance: float = 1e-10
 
     def factorize(self, system: System, shift: float) -> Any:
-        """Factor A + shift·I; the result's ``solve`` takes any number of right-hand sides as columns."""
+        """Factor A + shift·M; the result's ``solve`` takes any number of right-hand sides as columns."""
         return scipy.sparse.linalg.splu(
             system.matrix(shift).tocsc(),
             permc_spec="MMD_AT_PLUS_A",
@@ -44,7 +44,7 @@ class Direct:
         )
 
     def solve(self, system: System, rho: NDArray[np.float64]) -> Solution:
-        """Factor and solve for each ρ; the residual is ‖b - (A + I/ρ²) v‖ / ‖b‖."""
+        """Factor and solve for each ρ; the residual is ‖b - (A + M/ρ²) v‖ / ‖b‖."""
         columns = [self.factorize(system, 1.0 / r**2).solve(system.rhs) for r in rho]
         values = np.stack(columns, axis=1)
         residual = relative_residual(system, values, rho)

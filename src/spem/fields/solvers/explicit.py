@@ -1,4 +1,4 @@
-"""The paper's explicit iteration (5.1), kept as the reference: v ← v + τ (b - (A + I/ρ²) v)."""
+"""The paper's explicit iteration (5.1), kept as the reference: v ← v + τ (b - (A + M/ρ²) v)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class ExplicitIteration:
     Parameters
     ----------
     rtol
-        Tolerance on ‖b - (A + I/ρ²) v‖ / ‖b‖.
+        Tolerance on ‖b - (A + M/ρ²) v‖ / ‖b‖.
     max_iterations
         Limit for each field; the count grows like the square of the shape's width in voxels.
     """
@@ -41,7 +41,7 @@ class ExplicitIteration:
     def _descend(self, system: System, shift: float) -> tuple[NDArray[np.float64], int]:
         matrix = system.matrix(shift).tocsr()
         # Gershgorin: no eigenvalue exceeds the largest absolute row sum.
-        step = 2.0 / (np.abs(matrix).sum(axis=1).max() + shift)
+        step = 2.0 / (np.abs(matrix).sum(axis=1).max() + shift * system.mass.max())
         target = self.rtol * float(np.linalg.norm(system.rhs))
         v = np.zeros(system.n_nodes)
         for iteration in range(self.max_iterations):

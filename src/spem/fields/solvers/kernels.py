@@ -2,7 +2,7 @@
 
 A level is a graph in C order with, per node, neighbours in 2d directions (a dummy row of zeros stands for a
 missing one), a Laplacian diagonal and a mass; lane l of node i has the diagonal ``diagonal[i] + shift[l] *
-mass[i]``. `weight` and `mass` have one row for all nodes (finest level, `step` 0) or one per node (`step` 1).
+mass[i]``. `weight` has one row for all nodes (finest level, `step` 0) or one per node (`step` 1).
 
 Nodes are cut along the first axis into slabs, even and odd ones in turn; ``slabs[k]`` is the first node
 of slab k. A kernel does the slabs `first`, ``first + stride``, ... . Sweeps do all even slabs, then all odd
@@ -38,7 +38,7 @@ def multiply(
         dot = load(partial, slab)
         for i in range(slabs[slab], slabs[slab + 1]):
             here = load(p, i)
-            value = mul(add(splat(diagonal[i]), mul(s, splat(mass[i * step]))), here)
+            value = mul(add(splat(diagonal[i]), mul(s, splat(mass[i]))), here)
             for k in range(neighbours.shape[1]):
                 value = sub(value, mul(splat(weight[i * step, k]), load(p, neighbours[i, k])))
             store(q, i, value)
@@ -77,7 +77,7 @@ def relax_forward(
                 value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
             if neighbours[i, 1] >= later:
                 value = add(value, mul(splat(weight[i * step, 1]), load(z, neighbours[i, 1])))
-            store(z, i, div(value, add(splat(diagonal[i]), mul(s, splat(mass[i * step])))))
+            store(z, i, div(value, add(splat(diagonal[i]), mul(s, splat(mass[i])))))
 
 
 @njit(cache=True, nogil=True)
@@ -128,7 +128,7 @@ def relax_backward(
             value = source
             for k in range(neighbours.shape[1]):
                 value = add(value, mul(splat(weight[i * step, k]), load(z, neighbours[i, k])))
-            value = div(value, add(splat(diagonal[i]), mul(s, splat(mass[i * step]))))
+            value = div(value, add(splat(diagonal[i]), mul(s, splat(mass[i]))))
             store(z, i, value)
             dot = add(dot, mul(widen(source), widen(value)))
         store(partial, slab, dot)
@@ -179,7 +179,7 @@ def coarsen(aggregate: Table, n_coarse: int, level: Any) -> Any:
     for i in range(neighbours.shape[0]):
         here = aggregate[i]
         diagonal_c[here] += np.float32(0.5) * diagonal[i]
-        mass_c[here] += mass[i * step]
+        mass_c[here] += mass[i]
         for k in range(width):
             j = neighbours[i, k]
             if j == neighbours.shape[0]:

@@ -52,7 +52,7 @@ class Hierarchy:
             np.repeat(system.weights * unit**2, 2)[None].astype(np.float32),
             0,
             (system.diagonal * unit**2).astype(np.float32),
-            np.ones(1, np.float32),
+            system.mass.astype(np.float32),
         )
         voxels, shape = system.shape.voxels, np.array(system.shape.mask.shape)
         levels = []
@@ -133,6 +133,6 @@ def _invert(level: Level, shifts: NDArray[np.float64]) -> NDArray[np.float32]:
         matrix[np.arange(n), neighbours[:, k]] -= weight[step * np.arange(n), k]
     matrix = matrix[:, :n]
     stiffness = matrix + np.diag(diagonal.astype(np.float64))
-    masses = np.diag(np.broadcast_to(mass, n).astype(np.float64))
+    masses = np.diag(mass.astype(np.float64))
     inverse = np.linalg.inv(stiffness + shifts[:, None, None] * masses)
     return np.ascontiguousarray(inverse.transpose(1, 2, 0).reshape(n * n, LANES), np.float32)

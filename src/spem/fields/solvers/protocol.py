@@ -45,7 +45,7 @@ class Solution:
 
 
 class Solver(Protocol):
-    """Solves (A + I/ρ²) v = b for one or more ρ."""
+    """Solves (A + M/ρ²) v = b for one or more ρ."""
 
     def solve(self, system: System, rho: NDArray[np.float64]) -> Solution:
         """Fields ``(n_nodes, n_rho)`` of finite or infinite ρ > 0."""
@@ -55,7 +55,7 @@ class Solver(Protocol):
 def relative_residual(
     system: System, values: NDArray[np.float64], rho: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """‖b - (A + I/ρ²) v‖ / ‖b‖ of each field, in double precision."""
-    product = system.matrix() @ values + values / np.square(rho)
+    """‖b - (A + M/ρ²) v‖ / ‖b‖ of each field, in double precision."""
+    product = system.matrix() @ values + (system.mass[:, None] * values) / np.square(rho)
     residual = np.linalg.norm(system.rhs[:, None] - product, axis=0)
     return np.asarray(residual / np.linalg.norm(system.rhs))

@@ -53,21 +53,28 @@ def cross_operator(
     neighbours: NDArray[np.int32],
     weights: Small,
     diagonal: Small,
+    mass: Small,
     slabs: Slabs,
     first: int,
     stride: int,
 ) -> None:
-    """Write ``block.T @ A @ other`` to a slab's part, and the column sums of ``A @ other``."""
+    """Write ``block.T @ A @ other`` and ``block.T @ M @ other`` to a slab's part, each with column sums last."""
     for slab in range(first, slabs.size - 1, stride):
-        total = partial[slab]
-        total[:] = 0
+        stiff, heavy = partial[slab, 0], partial[slab, 1]
+        stiff[:] = 0
+        heavy[:] = 0
         for i in range(slabs[slab], slabs[slab + 1]):
-            value = mul(splat(diagonal[i]), load_wide(other, i))
+            here = load_wide(other, i)
+            value = mul(splat(diagonal[i]), here)
             for k in range(neighbours.shape[1]):
                 value = sub(value, mul(splat(weights[k]), load_wide(other, neighbours[i, k])))
+            here = mul(splat(mass[i]), here)
             for k in range(LANES):
-                store(total, k, add(load(total, k), mul(splat(np.float64(block[i, k])), value)))
-            store(total, LANES, add(load(total, LANES), value))
+                factor = splat(np.float64(block[i, k]))
+                store(stiff, k, add(load(stiff, k), mul(factor, value)))
+                store(heavy, k, add(load(heavy, k), mul(factor, here)))
+            store(stiff, LANES, add(load(stiff, LANES), value))
+            store(heavy, LANES, add(load(heavy, LANES), here))
 
 
 @njit(cache=True, nogil=True)
@@ -77,16 +84,19 @@ def true_residual(
     neighbours: NDArray[np.int32],
     weights: Small,
     diagonal: Small,
+    mass: Small,
     shift: Small,
     slabs: Slabs,
     first: int,
     stride: int,
 ) -> None:
-    """Write r = shift - (A + shift) u: how far u is from the deficit 1 - v."""
+    """Write r = shift M (1 - u) - A u: how far u is from the deficit 1 - v."""
     s = load(shift, 0)
+    one = splat(1.0)
     for slab in range(first, slabs.size - 1, stride):
         for i in range(slabs[slab], slabs[slab + 1]):
-            value = sub(s, mul(add(splat(diagonal[i]), s), load_wide(u, i)))
+            here = load_wide(u, i)
+            value = sub(mul(mul(s, splat(mass[i])), sub(one, here)), mul(splat(diagonal[i]), here))
             for k in range(neighbours.shape[1]):
                 value = add(value, mul(splat(weights[k]), load_wide(u, neighbours[i, k])))
             store(r, i, value)

@@ -1,7 +1,7 @@
 """All ρ for about the price of one: block multigrid CG at a few poles, and a Galerkin basis.
 
 With the boundary eliminated every ρ has the same right-hand side, and the matrices differ by a multiple of
-the identity. The deficits u = 1 - v of all ρ lie, to any useful accuracy, in a space of some ten dimensions.
+one diagonal. The deficits u = 1 - v of all ρ lie, to any useful accuracy, in a space of some ten dimensions.
 So eight shifts are solved at once as the lanes of one array, in single precision; their span predicts all
 other ρ; the true residual of the prediction at eight further shifts, taken in double precision, measures its
 error and is what the next eight are solved for, until the error is below the tolerance everywhere.
@@ -144,7 +144,7 @@ class _Block:
         return float(self.error.max())
 
     def solve(self) -> NDArray[np.float32]:
-        """Solve (A + s) x = r, lane by lane, for the residual that was measured."""
+        """Solve (A + s M) x = r, lane by lane, for the residual that was measured."""
         x, r, z, p, q = self.x, self.r, self.z, self.p, self.q
         graph, shift = self.hierarchy.levels[0].graph, self.cycle.shift
         x[:] = 0
@@ -168,9 +168,9 @@ def _hyperfield(
     system: System, rho: NDArray[np.float64], basis: ReducedBasis, shifts: Small, rtol: float, error: float
 ) -> Hyperfield:
     """Compress the basis for the range of shifts and put the operator back in the unit of the spacing."""
-    columns, mass, stiffness = basis.compress(shifts, _DROPPED * rtol)
+    columns, gram, mass, stiffness = basis.compress(shifts, _DROPPED * rtol)
     stiffness /= min(system.shape.spacing) ** 2
-    return Hyperfield(system.shape, rho, columns, mass, stiffness, system.boundary, error)
+    return Hyperfield(system.shape, rho, columns, gram, mass, stiffness, system.boundary, error)
 
 
 def _ratio(numerator: Small, denominator: Small) -> NDArray[np.float32]:
