@@ -23,14 +23,15 @@ def test_info_tells_what_was_read(spem: Spem, image: Path) -> None:
     assert set(facts) >= {"name", "method", "components", "repairs", "watertight", "volume", "default_rho"}
 
 
-def test_info_tells_repairs_on_stderr(spem: Spem, tmp_path: Path) -> None:
-    """A dropped speck is told in the facts and on stderr."""
+def test_repairs_are_told(spem: Spem, tmp_path: Path) -> None:
+    """A dropped speck is told among the facts, and on stderr where a field is made of the rest."""
     mask = np.zeros((9, 9), bool)
     mask[1:5, 1:5], mask[7, 7] = True, True
     np.save(tmp_path / "speck.npy", mask)
-    result = spem("info", tmp_path / "speck.npy", "--json")
-    assert "kept the largest of 2 components" in json.loads(result.stdout)["repairs"][0]
-    assert "kept the largest of 2 components" in result.stderr
+    facts = json.loads(spem("info", tmp_path / "speck.npy", "--json").stdout)
+    assert "kept the largest of 2 components" in facts["repairs"][0]
+    result = spem("field", tmp_path / "speck.npy", "--rho", "2", "-o", tmp_path / "f.npz")
+    assert "speck.npy: kept the largest of 2 components" in result.stderr
     kept = spem("info", tmp_path / "speck.npy", "--json", "--components", "all")
     assert json.loads(kept.stdout)["voxels"] == 17
 

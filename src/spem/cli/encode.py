@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -61,6 +60,11 @@ def encode(
     n_maps: Annotated[int | None, typer.Option(min=1, help="Maps of each range.")] = None,
     n_centers: Annotated[int | None, typer.Option(min=1, help="Centres of the vocabulary.")] = None,
     power: Annotated[float | None, typer.Option(help="Exponent of the residuals, α of (5.3).")] = None,
+    scaling: Annotated[str | None, typer.Option(metavar="KIND", help="How maps are made comparable.")] = None,
+    moments: Annotated[int | None, typer.Option(help="Moments of the residuals in a code, 1 or 2.")] = None,
+    drop_boundary: Annotated[
+        bool | None, typer.Option("--drop-boundary/--keep-boundary", help="Leave out nodes at the boundary.")
+    ] = None,
     threshold: Annotated[float | None, typer.Option(help="Grey level of the surface.")] = None,
     dark: Annotated[
         bool | None, typer.Option("--dark/--light", help="Whether shapes are darker than the ground.")
@@ -99,6 +103,9 @@ def encode(
         "n_maps": n_maps,
         "n_centers": n_centers,
         "power": power,
+        "scaling": scaling,
+        "moments": moments,
+        "drop_boundary": drop_boundary,
         "threshold": threshold,
         "dark": dark,
         "components": components and components.value,
@@ -168,6 +175,7 @@ def encode_paths(
     from spem.codes.codes import Codes
     from spem.codes.collection import encode_collection, merge
     from spem.codes.sources import find_files
+    from spem.fields.solvers.team import usable_threads
 
     files = [path for path in find_files(paths) if path.absolute() != output.absolute()]
     known = Codes.load(output) if output.exists() and not overwrite else None
@@ -178,7 +186,7 @@ def encode_paths(
     model = known.model if known is not None else model
     settings = _settings(options, model, output if known is not None else vocabulary, paper=paper)
     work = output.with_name(output.name + ".work")
-    n_jobs = jobs or max(1, min(len(os.sched_getaffinity(0)), len(files) // SHAPES_PER_PROCESS))
+    n_jobs = jobs or max(1, min(usable_threads(), len(files) // SHAPES_PER_PROCESS))
     with Bar() as bar:
         try:
             codes = encode_collection(

@@ -25,6 +25,7 @@ from spem.cli.options import (
     Voxels,
     check_device,
     read_shape,
+    tell_repairs,
 )
 from spem.cli.output import PLOT_SUFFIXES, check_target, print_json, write_figure, write_npz
 from spem.errors import ParameterError
@@ -86,6 +87,7 @@ def field(
     values_of_rho = check_rho(rho)
     grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius}
     found = read_shape(shape, **grid, threshold=threshold, dark=dark, label=label, components=components)  # type: ignore[arg-type]
+    tell_repairs(found)
     _check_drawable(found, plot)
     from spem.api import field as solve
 
@@ -140,6 +142,7 @@ def maps(
     _check_targets(output, plot)
     grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius}
     found = read_shape(shape, **grid, threshold=threshold, dark=dark, label=label, components=components)  # type: ignore[arg-type]
+    tell_repairs(found)
     _check_drawable(found, plot)
     from spem.api import maps as project
     from spem.fields.rho import sample_rho

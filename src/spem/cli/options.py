@@ -101,7 +101,7 @@ def read_shape(
     label: int | None = None,
     components: ComponentsChoice = ComponentsChoice.largest,
 ) -> Shape:
-    """Read a shape as the options say, and tell on stderr what was changed.
+    """Read a shape as the options say.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def read_shape(
     """
     from spem.shapes.read import read
 
-    shape = read(
+    return read(
         path,
         voxels=voxels,
         spacing=spacing,
@@ -120,6 +120,9 @@ def read_shape(
         label=label,
         components=components.value,
     )
+
+
+def tell_repairs(shape: Shape) -> None:
+    """Tell on stderr what was changed when a shape was read."""
     for repair in shape.report.repairs:
-        complain(f"{path}: {repair}")
-    return shape
+        complain(f"{shape.report.source or shape.name}: {repair}")
