@@ -230,7 +230,7 @@ class Shape:
     def points(self) -> NDArray[np.float64]:
         """``(n_nodes, d)`` coordinates of the nodes, in the shape's own coordinates."""
         index = np.stack(np.unravel_index(self.voxels, self.mask.shape), axis=1)
-        return np.asarray(self.origin) + index * np.asarray(self.spacing)
+        return np.asarray(np.asarray(self.origin) + index * np.asarray(self.spacing))
 
     @property
     def axes(self) -> tuple[NDArray[np.float64], ...]:
@@ -243,7 +243,7 @@ class Shape:
         nodal = np.asarray(values)
         grid = np.full((self.mask.size, *nodal.shape[1:]), fill, np.result_type(nodal, np.float32))
         grid[self.voxels] = nodal
-        return grid.reshape(self.mask.shape + nodal.shape[1:])
+        return np.asarray(grid.reshape(self.mask.shape + nodal.shape[1:]))
 
     def __repr__(self) -> str:
         grid = " x ".join(map(str, self.mask.shape))

@@ -58,7 +58,7 @@ def cross_operator(
     first: int,
     stride: int,
 ) -> None:
-    """Write ``block.T @ A @ other`` and ``block.T @ M @ other`` to a slab's part, each with column sums last."""
+    """Write ``block.T @ A @ other`` and ``block.T @ M @ other`` to a slab's part, each with column sums."""
     for slab in range(first, slabs.size - 1, stride):
         stiff, heavy = partial[slab, 0], partial[slab, 1]
         stiff[:] = 0
