@@ -10,13 +10,12 @@ STAMPS := $(VENV)/stamps
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3.14 python3 python; do \
 	"$$p" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo "$$p" && break; done)
 
-# Tests run in two processes, each with one thread.
-export OMP_NUM_THREADS ?= 1
-export NUMBA_NUM_THREADS ?= 1
-
 demo: $(STAMPS)/spem
 	$(BIN)/spem demo demo
 
+# Two processes, each with one thread.
+test: export OMP_NUM_THREADS = 1
+test: export NUMBA_NUM_THREADS = 1
 test: $(STAMPS)/test
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
