@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import spem
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.image import imread
 from spem.plots.figures import figure_fields, figure_maps
 from spem.plots.profiles import draw_basis, draw_profiles
-from spem.shapes.creatures import creature
+from spem.plots.thumbnails import thumbnail
+from spem.shapes.creatures import collection, creature
 
 FOLDER = Path(__file__).parent / "images"
 
@@ -39,6 +42,24 @@ def main() -> None:
     draw_profiles(field, nodes, middle, shape_ax=left)
     draw_basis(spem.maps(field, n_maps=4), right)
     save(profiles, "profiles.png")
+    save(answers(), "answers.png")
+
+
+def answers() -> Figure:
+    """Draw the first answers to a query of four kinds, among creatures of all kinds."""
+    rng = np.random.default_rng(1)
+    shapes, labels = zip(*collection(n_per_class=6, rng=rng), strict=True)
+    codes = spem.encode(list(shapes))
+    figure = Figure(figsize=(9, 5.4), layout="constrained")
+    rows = figure.subplots(4, 6)
+    for row, kind in zip(rows, ("human", "ant", "giraffe", "crab"), strict=True):
+        query = labels.index(kind)
+        for axis, answer in zip(row, spem.search(codes, shapes[query], k=6), strict=True):
+            found = codes.names.index(answer.name)
+            axis.imshow(imread(BytesIO(thumbnail(shapes[found], 160))))
+            axis.set_title("query" if found == query else f"{labels[found]}, {answer.distance:.2f}", fontsize=9)
+            axis.axis("off")
+    return figure
 
 
 if __name__ == "__main__":
