@@ -6,10 +6,11 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-import spem
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+
+import spem
 from spem.plots.figures import figure_fields, figure_maps
 from spem.plots.profiles import draw_basis, draw_profiles
 from spem.plots.thumbnails import thumbnail
@@ -57,7 +58,9 @@ def answers() -> Figure:
         for axis, answer in zip(row, spem.search(codes, shapes[query], k=6), strict=True):
             found = codes.names.index(answer.name)
             axis.imshow(imread(BytesIO(thumbnail(shapes[found], 160))))
-            axis.set_title("query" if found == query else f"{labels[found]}, {answer.distance:.2f}", fontsize=9)
+            axis.set_title(
+                "query" if found == query else f"{labels[found]}, {answer.distance:.2f}", fontsize=9
+            )
             axis.axis("off")
     return figure
 
