@@ -116,18 +116,25 @@ def few(rho: np.ndarray) -> np.ndarray:
 
 
 def shifted_cg(system: System, rho: np.ndarray) -> Fields:
-    """Solve for all ρ in the Krylov space of A and b; a shift changes the matrix by a multiple of 1."""
-    matrix = scipy.sparse.csr_array(system.matrix())
-    values, iterations = multi_shift(matrix, system.rhs, rho**-2.0)
-    return np.arange(rho.size), values, iterations
+    """Solve for all ρ in one Krylov space, after scaling by M^(-1/2): a shift then adds a multiple of 1."""
+    matrix, scale = scaled(system)
+    values, iterations = multi_shift(matrix, scale * system.rhs, rho**-2.0)
+    return np.arange(rho.size), scale[:, None] * values, iterations
 
 
 def deficit_cg(system: System, rho: np.ndarray) -> Fields:
-    """Solve likewise for the deficit, whose right-hand side 1/ρ² is as smooth as can be."""
-    matrix = scipy.sparse.csr_array(system.matrix())
+    """Solve likewise for the deficit, (A + sM)(1 - v) = sM·1, whose right-hand side is smooth."""
+    matrix, scale = scaled(system)
     shifts = rho**-2.0
-    values, iterations = multi_shift(matrix, np.ones(system.n_nodes), shifts)
-    return np.arange(rho.size), 1.0 - shifts * values, iterations
+    values, iterations = multi_shift(matrix, 1.0 / scale, shifts)
+    return np.arange(rho.size), 1.0 - shifts * scale[:, None] * values, iterations
+
+
+def scaled(system: System) -> tuple[scipy.sparse.csr_array, np.ndarray]:
+    """Return M^(-1/2) A M^(-1/2), and the diagonal of M^(-1/2)."""
+    scale = 1.0 / np.sqrt(system.mass)
+    diagonal = scipy.sparse.diags_array(scale)
+    return scipy.sparse.csr_array(diagonal @ system.matrix() @ diagonal), scale
 
 
 def multi_shift(

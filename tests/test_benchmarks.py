@@ -13,7 +13,7 @@ import pytest
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 KEYS = {"benchmark", "quick", "machine", "facts", "tables", "targets", "skipped"}
-WITHOUT_DATA = ("convergence", "solvers", "startup", "sweep_accuracy", "sweep_scaling")
+WITHOUT_DATA = ("convergence", "startup", "sweep_accuracy", "sweep_scaling")
 
 
 def _run(name: str, out: Path, **environment: str) -> dict:
@@ -34,6 +34,14 @@ def test_benchmark_runs_without_data(name, tmp_path):
     assert result["tables"]
     assert all(rows for rows in result["tables"].values())
     assert not any("shrec11" in title or "tari1000" in title for title in result["tables"])
+
+
+def test_candidates_solve_the_system_of_the_sweep(tmp_path):
+    """All candidates come to the same fields, so that their times compare."""
+    result = _run("solvers", tmp_path, SPEM_DATA=str(tmp_path / "absent"))
+    errors = [row["error"] for rows in result["tables"].values() for row in rows if "error" in row]
+    assert len(errors) >= 10
+    assert max(errors) < 1e-3
 
 
 def test_collections_are_skipped_without_data(tmp_path):
