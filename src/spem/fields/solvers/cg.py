@@ -10,17 +10,17 @@ import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from spem.fields.operator import System
-from spem.fields.solvers.protocol import Solution, relative_residual
+from spem.fields.solvers.protocol import Solution, deficit_residual
 
 
 @dataclass(frozen=True)
 class ConjugateGradient:
-    """Conjugate gradients with the diagonal as preconditioner.
+    """Conjugate gradients with the diagonal as preconditioner, for the deficit 1 - v.
 
     Parameters
     ----------
     rtol
-        Tolerance on ‖b - (A + M/ρ²) v‖ / ‖b‖.
+        Tolerance on `deficit_residual`, a bound of the root mean square error of each field.
     max_iterations
         Limit for each field.
     """
@@ -36,22 +36,20 @@ class ConjugateGradient:
             nonlocal spent
             spent += 1
 
-        columns = []
-        for r in rho:
-            shift = 1.0 / r**2
+        deficits = np.zeros((system.n_nodes, rho.size))
+        for j in np.flatnonzero(np.isfinite(rho)):
+            shift = rho[j] ** -2.0
             matrix = system.matrix(shift).tocsr()
-            jacobi = scipy.sparse.diags_array(1.0 / matrix.diagonal())
-            v, _ = scipy.sparse.linalg.cg(
+            deficits[:, j], _ = scipy.sparse.linalg.cg(
                 matrix,
-                system.rhs,
-                x0=np.ones(system.n_nodes),
+                shift * system.mass,
                 rtol=self.rtol / 2,
                 maxiter=self.max_iterations,
-                M=jacobi,
+                M=scipy.sparse.diags_array(1.0 / matrix.diagonal()),
                 callback=count,
             )
-            columns.append(v)
-        values = np.stack(columns, axis=1)
-        residual = relative_residual(system, values, rho)
+        residual = deficit_residual(system, deficits, rho)
         converged = bool(np.all(residual <= self.rtol))
-        return Solution(values, residual, converged, spent, f"raise rtol={self.rtol:g} or max_iterations")
+        return Solution(
+            1.0 - deficits, residual, converged, spent, f"raise rtol={self.rtol:g} or max_iterations"
+        )

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from spem.fields.hyperfield import galerkin
@@ -64,6 +65,12 @@ class ReducedBasis:
         stiffness, mass = self.stiffness[np.ix_(used, used)], self.mass[np.ix_(used, used)]
         y[used] = galerkin(stiffness, mass, shifts)
         return y
+
+    def lowest(self) -> float:
+        """Lowest eigenvalue of the operator on the basis, an upper bound of its lowest of all."""
+        used = np.diag(self.gram) > 0
+        block = np.ix_(used, used)
+        return float(scipy.linalg.eigh(self.stiffness[block], self.mass[block], eigvals_only=True)[0])
 
     def combine(self, y: Small, out: NDArray[Any]) -> None:
         """Write the `LANES` vectors with coefficients `y` to the first n rows of `out`."""

@@ -28,11 +28,18 @@ from spem.fields.solvers.team import Team
 # to the largest shift, where the fields vary fastest. Least worst error over hands, combs and balls.
 _LOWEST_POLE = 0.06
 # A block is solved to this fraction of the tolerance, or of its own start: single precision ends there.
-_MARGIN, _SINGLE_LIMIT = 0.2, 1e-6
+_MARGIN, _SINGLE_LIMIT = 0.1, 1e-6
+# The estimate stands for the shifts between its own too, so it has to be this much below the tolerance.
+_ACCEPTED = 0.25
 # Basis columns kept in single precision err by about 1e-7 of the field.
 _SINGLE_STORAGE = 3e-7
+# What storing the columns adds to the error of a field, in units of their rounding.
+_STORAGE_ROUNDINGS = 3.0
 # Basis directions that contribute less than this fraction of the tolerance are dropped at the end.
 _DROPPED = 1e-2
+
+# Points of the logarithmic grid that stands for a range of shifts.
+_DENSE = 200
 
 Small = NDArray[np.float64]
 
@@ -100,20 +107,24 @@ class Sweep:
         block = _Block(hierarchy, basis, self)
         poles: list[float] = []
         worst, converged = 0.0, targets.size == 0
-        candidates = _candidates(targets)
         while not converged and len(poles) < self.max_blocks * LANES:
-            shifts = _first_poles(targets) if not poles else _next_poles(np.array(poles), candidates)
+            shifts = _next_poles(np.array(poles), targets, basis.lowest()) if poles else _first_poles(targets)
             worst = block.measure(shifts)
-            converged = bool(poles) and worst <= self.rtol / 2
+            converged = bool(poles) and worst <= _ACCEPTED * self.rtol
             if not converged:
                 basis.extend(block.solve())
                 poles.extend(shifts)
         if not converged and poles:
-            worst = block.measure(_next_poles(np.array(poles), candidates))
-            converged = worst <= self.rtol / 2
+            worst = block.measure(_next_poles(np.array(poles), targets, basis.lowest()))
+            converged = worst <= _ACCEPTED * self.rtol
         iterations = block.iterations
         del block
-        return _hyperfield(system, rho, basis, candidates, self.rtol, worst), worst, iterations, converged
+        return (
+            _hyperfield(system, rho, basis, _dense(targets), self.rtol, worst),
+            worst,
+            iterations,
+            converged,
+        )
 
 
 class _Block:
@@ -170,6 +181,7 @@ def _hyperfield(
     """Compress the basis for the range of shifts and put the operator back in the unit of the spacing."""
     columns, gram, mass, stiffness = basis.compress(shifts, _DROPPED * rtol)
     stiffness /= min(system.shape.spacing) ** 2
+    error += _STORAGE_ROUNDINGS * float(np.finfo(columns.dtype).eps)
     return Hyperfield(system.shape, rho, columns, gram, mass, stiffness, system.boundary, error)
 
 
@@ -189,23 +201,28 @@ def _first_poles(targets: Small) -> Small:
     return np.asarray(distinct[0] * (distinct[-1] / distinct[0]) ** t)
 
 
-def _candidates(targets: Small) -> Small:
-    """Shifts at which the error is to be small: the targets if few, else a dense logarithmic grid."""
+def _dense(targets: Small, floor: float = 0.0) -> Small:
+    """Shifts at which the error is to be small: the targets if few, else a geometric grid of s + floor."""
     distinct = np.unique(targets)
     if distinct.size <= LANES:
         return distinct
-    return np.geomspace(distinct[0], distinct[-1], 25 * LANES)
+    grid = np.geomspace(distinct[0] + floor, distinct[-1] + floor, _DENSE) - floor
+    return np.clip(grid, distinct[0], distinct[-1])
 
 
-def _next_poles(poles: Small, candidates: Small) -> Small:
-    """Eight more shifts, each where the rational interpolant's ∏|s - p|/(s + p) is largest (Leja)."""
+def _next_poles(poles: Small, targets: Small, floor: float) -> Small:
+    """Eight more shifts s, where the rational interpolant's ∏|s - p|/(s + p + 2λ) is largest in turn (Leja).
+
+    λ, the `floor`, is the lowest eigenvalue of the operator: fields change little with shifts far below it.
+    The largest shift, where fields vary fastest, is always among the eight: what single precision left of
+    its error shows nowhere else.
+    """
+    candidates = _dense(targets, floor)
     if candidates.size <= LANES:
         return np.pad(candidates, (0, LANES - candidates.size), mode="edge")
     chosen = list(poles)
-    tiny = np.finfo(float).tiny
-    decay = sum(np.log(np.abs(candidates - p) / (candidates + p) + tiny) for p in chosen)
-    for _ in range(LANES):
-        pole = candidates[int(np.argmax(decay))]
-        decay = decay + np.log(np.abs(candidates - pole) / (candidates + pole) + tiny)
-        chosen.append(pole)
-    return np.array(chosen[-LANES:])
+    for _ in range(LANES - 1):
+        distance = np.abs(np.subtract.outer(candidates, chosen))
+        ratio = distance / (np.add.outer(candidates, chosen) + 2 * floor) + np.finfo(float).tiny
+        chosen.append(candidates[int(np.argmax(np.log(ratio).sum(axis=1)))])
+    return np.array([*chosen[1 - LANES :], candidates[-1]])
