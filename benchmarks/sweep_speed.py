@@ -29,7 +29,7 @@ OURS = f"ours: hyperfield of {N_RHO} rho and {N_MAPS} maps"
 OURS_FULL = f"ours: the same, all {N_RHO} fields materialised"
 PLAIN = "scipy: CG, diagonal"
 TO_PYAMG, TO_PLAIN = "to pyamg's fastest", "to plain CG"
-RATIO_LIMIT = 1.0
+RATIO_LIMIT = 0.5
 HOPELESS = 2.0
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spem.embedding.maps import Maps, compute_maps
+from spem.errors import ParameterError
 from spem.fields.hyperfield import Hyperfield
 from spem.fields.operator import Boundary, assemble
 from spem.fields.rho import DEFAULT_COUNT, Scheme, check_rho, sample_rho
@@ -98,19 +99,29 @@ def sweep(
     return Sweep(rtol=rtol).hyperfield(assemble(shape, boundary), samples)
 
 
-def maps(source: Shape | Hyperfield, n_maps: int = 6, *, centred: bool = False, **options: Any) -> Maps:
+def maps(
+    source: Shape | Hyperfield,
+    n_maps: int = 6,
+    *,
+    centred: bool = False,
+    rho: ArrayLike | None = None,
+    n_rho: int = DEFAULT_COUNT,
+    scheme: Scheme = "linear",
+    boundary: Boundary = "surface",
+    rtol: float = 1e-6,
+) -> Maps:
     """SPEM maps of a shape or of its hyperfield: P = YΦ (4.4).
 
     Parameters
     ----------
     source
-        A shape, swept with `options` first, or a hyperfield.
+        A shape, swept first, or a hyperfield.
     n_maps
         Number of maps.
     centred
         Remove the mean field first.
-    **options
-        Passed to `sweep` when `source` is a shape.
+    rho, n_rho, scheme, boundary, rtol
+        As for `sweep`; a hyperfield has its own.
 
     Examples
     --------
@@ -118,5 +129,10 @@ def maps(source: Shape | Hyperfield, n_maps: int = 6, *, centred: bool = False, 
     >>> spem.maps(spem.synthetic.disk(radius=20.0, spacing=1.0), n_maps=4).basis.shape
     (64, 4)
     """
-    hyperfield = source if isinstance(source, Hyperfield) else sweep(source, **options)
-    return compute_maps(hyperfield, n_maps, centred=centred)
+    given = (rho is None, n_rho, scheme, boundary, rtol)
+    if not isinstance(source, Hyperfield):
+        source = sweep(source, rho, n_rho=n_rho, scheme=scheme, boundary=boundary, rtol=rtol)
+    elif given != (True, DEFAULT_COUNT, "linear", "surface", 1e-6):
+        msg = "maps of a hyperfield: rho, n_rho, scheme, boundary and rtol are its own; give them to sweep"
+        raise ParameterError(msg)
+    return compute_maps(source, n_maps, centred=centred)

@@ -86,6 +86,24 @@ def test_sign_does_not_flip_between_near_identical_shapes(cross):
     assert np.all(np.sum(a * b, axis=0) > 0.99)
 
 
+def test_sign_is_that_of_the_largest_rho(cross):
+    """The order of the samples changes neither a map nor its sign."""
+    field = spem.sweep(cross, rho=RHO)
+    turned = compute_maps(field.resampled(RHO[::-1]))
+    assert np.allclose(turned.values, compute_maps(field).values, atol=1e-5)
+
+
+def test_nothing_explains_nothing(cross):
+    """Where no variance is, no map explains any of it."""
+    assert np.array_equal(spem.maps(cross, 1, rho=[np.inf], centred=True).explained, [0.0])
+
+
+def test_options_of_a_sweep_are_refused_with_a_hyperfield(cross):
+    """A hyperfield has its own samples; others are not silently ignored."""
+    with pytest.raises(ParameterError, match="maps of a hyperfield: rho, n_rho"):
+        spem.maps(spem.sweep(cross), n_rho=8)
+
+
 def test_maps_do_not_depend_on_the_unit(cross):
     """With the default range, a shape in other units has the same maps."""
     scaled = Shape(cross.mask, (0.2, 0.2), (0.0, 0.0))

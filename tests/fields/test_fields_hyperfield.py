@@ -54,6 +54,21 @@ def test_any_rho_of_the_range_on_demand(field, comb):
     assert field.at(7.7).shape == (comb.n_nodes,)
 
 
+@pytest.mark.parametrize("rho", [[0.5, 1000.0], [2.0, 4.0, 8.0], np.geomspace(1, 200, 8)])
+def test_few_samples_cover_their_range_too(comb, rho):
+    """Between two samples far apart, a field is as accurate as at them."""
+    field = spem.sweep(comb, rho=rho)
+    between = np.geomspace(rho[0], rho[-1], 23)
+    assert np.abs(field.at(between) - Direct().solve(assemble(comb), between).values).max() < 1e-6
+
+
+def test_other_samples_of_the_same_range(field):
+    """A hyperfield resampled has the fields of the new samples, and refuses those outside its range."""
+    assert np.array_equal(field.resampled([3.0, 9.5]).fields(), field.at([3.0, 9.5]))
+    with pytest.raises(ParameterError, match="rho=1: this hyperfield of comb covers 2 to 30"):
+        field.resampled([1.0, 9.5])
+
+
 def test_rho_outside_the_range_is_refused(field):
     """The low-rank form promises nothing outside its range, and says so."""
     with pytest.raises(ParameterError, match="rho=31: this hyperfield of comb covers 2 to 30"):
@@ -97,6 +112,20 @@ def test_zarr_round_trip(tmp_path):
     assert again.shape.report == shape.report
     assert np.array_equal(again.shape.affine, np.eye(3))
     assert [p.name for p in tmp_path.iterdir()] == ["f.zarr"]
+
+
+def test_saving_never_replaces_anything_else(tmp_path):
+    """A folder or file that is no hyperfield stays as it is."""
+    field = spem.sweep(Shape.from_mask(np.ones((3, 4))), rho=[1.0, 2.0])
+    folder, file = tmp_path / "precious", tmp_path / "thesis.txt"
+    folder.mkdir()
+    file.write_text("years")
+    (folder / "more.txt").write_text("of work")
+    for target in (folder, file):
+        with pytest.raises(ReadError, match="hyperfield"):
+            field.save(target)
+    assert (folder / "more.txt").read_text() == "of work"
+    assert file.read_text() == "years"
 
 
 def test_reading_what_is_no_hyperfield(tmp_path):

@@ -125,6 +125,26 @@ def test_sweep_agrees_with_the_direct_solver(mask, rho, boundary):
     assert error.max() <= 1e-6
 
 
+@pytest.mark.parametrize(
+    ("counts", "spacing", "low", "high"),
+    [((120, 120), (1, 100), 50, 3000), ((12, 30, 10), (1, 1, 30), 1, 300), ((60, 60), (1, 1), 0.3, 5000)],
+)
+def test_sweep_keeps_its_tolerance_on_hard_grids(counts, spacing, low, high):
+    """Flat voxels and wide ranges of ρ make a cycle find less of an error; the sweep allows for it."""
+    system = assemble(Shape.from_mask(np.ones(counts), spacing))
+    rho = np.geomspace(low, high, 20)
+    solution = Sweep().solve(system, rho)
+    assert np.abs(solution.values - Direct().solve(system, rho).values).max() < 1e-6
+
+
+def test_a_useless_rho_or_tolerance_is_refused():
+    """A ρ of a billionth of a voxel, or a tolerance of nothing, is named before any work."""
+    with pytest.raises(ParameterError, match="hand: rho=1e-09 is below 1e-06 of the spacing 1"):
+        spem.field(hand(), 1e-9)
+    with pytest.raises(ParameterError, match="rtol=0: expected a tolerance between 0 and 1"):
+        Sweep(rtol=0.0)
+
+
 def test_threads_and_slabs_change_nothing():
     """A shape of many slabs has the same field, bit by bit, on any number of threads; and the right one."""
     mask = np.hypot(*np.indices((400, 360)) - 180) % 60 < 50

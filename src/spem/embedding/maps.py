@@ -15,8 +15,8 @@ from spem.shapes.shape import Shape
 if TYPE_CHECKING:
     import xarray
 
-# A last entry below this fraction of the largest cannot carry the sign: rounding or a small change of
-# the shape could flip it.
+# An entry below this fraction of the largest cannot carry the sign: rounding or a small change of the
+# shape could flip it.
 _SMALL_LAST = 1e-3
 
 
@@ -53,7 +53,9 @@ class Maps:
     @property
     def explained(self) -> NDArray[np.float64]:
         """``(n_maps,)`` fraction of the total variance that each map explains."""
-        return self.variance / self.total_variance
+        return (
+            self.variance / self.total_variance if self.total_variance > 0 else np.zeros_like(self.variance)
+        )
 
     def to_xarray(self, *, grid: bool = False) -> xarray.DataArray:
         """Label the maps: dims ``(node, map)``, or one dim per axis of the grid and ``map``."""
@@ -80,7 +82,8 @@ def compute_maps(field: Hyperfield, n_maps: int = 6, *, centred: bool = False) -
 
     With Y the ``(n_nodes, n_rho)`` matrix of fields, Φ holds the leading eigenvectors of YᵀY and the maps are
     P = YΦ (4.4). Y is never formed: its singular value decomposition is that of a small matrix, the
-    coefficients in an orthonormal basis, so components are right down to rounding of the strongest one.
+    coefficients in an orthonormal basis, so components are right down to a hundredth of the tolerance of
+    the sweep, relative to the strongest one: 1e-9 takes a sweep with ``rtol=1e-11``.
 
     Parameters
     ----------
@@ -110,17 +113,17 @@ def compute_maps(field: Hyperfield, n_maps: int = 6, *, centred: bool = False) -
     left, size, right = np.linalg.svd(small, full_matrices=False)
     size = np.pad(size, (0, max(0, n_maps - size.size)))
     left, basis = _complete(left, n_maps), _complete(right.T, n_maps)
-    sign = _signs(basis)
+    sign = _signs(basis, int(np.argmax(field.rho)))
     mix = np.linalg.solve(upper, left * (size[:n_maps] * sign))
     values = field.basis @ mix[1:].astype(field.basis.dtype) + mix[0].astype(field.basis.dtype)
     variance, total = np.square(size) / field.shape.n_nodes, np.square(size).sum() / field.shape.n_nodes
     return Maps(field.shape, values, basis * sign, variance[:n_maps], field.rho, float(total), centred)
 
 
-def _signs(basis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sign that makes the last entry of each column positive, or the largest where the last is negligible."""
+def _signs(basis: NDArray[np.float64], last: int) -> NDArray[np.float64]:
+    """Sign that makes the entry of the largest ρ positive, or the largest entry where that is negligible."""
     largest = np.take_along_axis(basis, np.abs(basis).argmax(axis=0)[None], axis=0)[0]
-    leading = np.where(np.abs(basis[-1]) > _SMALL_LAST * np.abs(largest), basis[-1], largest)
+    leading = np.where(np.abs(basis[last]) > _SMALL_LAST * np.abs(largest), basis[last], largest)
     return np.where(leading < 0, -1.0, 1.0)
 
 

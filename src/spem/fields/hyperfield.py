@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,6 +75,10 @@ class Hyperfield:
         finite = np.isfinite(wanted)
         a[:, finite] -= galerkin(self.stiffness, self.mass, wanted[finite] ** -2.0)
         return a
+
+    def resampled(self, rho: ArrayLike) -> Hyperfield:
+        """Return the same hyperfield with other samples of its range."""
+        return replace(self, rho=self._check(rho))
 
     def fields(self) -> NDArray[np.floating[Any]]:
         """Materialise all sampled fields, ``(n_nodes, n_rho)``."""

@@ -21,7 +21,7 @@ _CHUNK = 32_768
 
 
 def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
-    """Write a hyperfield to the zarr group `path`, replacing one that is there.
+    """Write a hyperfield to the zarr group `path`, replacing a hyperfield that is there and nothing else.
 
     The group is written beside its place and moved there when it is whole.
 
@@ -32,6 +32,11 @@ def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
     path
         Folder of the group, by custom ``*.zarr``.
 
+    Raises
+    ------
+    ReadError
+        If something else than a hyperfield is there.
+
     Examples
     --------
     >>> import spem, tempfile
@@ -39,11 +44,14 @@ def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     save_hyperfield(field, f"{folder}/disk.zarr")
     ...     load_hyperfield(f"{folder}/disk.zarr")
-    Hyperfield('disk', 193 nodes, 2 rho 2 to 4, rank 2)
+    Hyperfield('disk', 193 nodes, 2 rho 2 to 4, rank ...)
     """
     target = Path(path)
-    draft = target.with_name(target.name + ".part")
-    shutil.rmtree(draft, ignore_errors=True)
+    if target.exists():
+        load_hyperfield(target)
+    draft, old = (target.with_name(target.name + suffix) for suffix in (".part", ".old"))
+    for folder in (draft, old):
+        shutil.rmtree(folder, ignore_errors=True)
     group = zarr.open_group(draft, mode="w")
     shape, cuts = field.shape, field.shape.cuts
     arrays: dict[str, NDArray[Any]] = {
@@ -75,8 +83,10 @@ def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
             "report": asdict(shape.report),
         }
     )
-    shutil.rmtree(target, ignore_errors=True)
+    if target.exists():
+        target.rename(old)
     draft.rename(target)
+    shutil.rmtree(old, ignore_errors=True)
 
 
 def load_hyperfield(path: str | Path) -> Hyperfield:

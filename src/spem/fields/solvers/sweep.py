@@ -12,21 +12,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
-from spem.errors import ConvergenceError
+from spem.errors import ParameterError
 from spem.fields.hyperfield import Hyperfield
 from spem.fields.operator import System
 from spem.fields.solvers import kernels
 from spem.fields.solvers.lanes import LANES
 from spem.fields.solvers.multigrid import Cycle, Hierarchy, rows
+from spem.fields.solvers.poles import Targets
 from spem.fields.solvers.protocol import Solution
 from spem.fields.solvers.reduced import ReducedBasis
 from spem.fields.solvers.team import Team
 
-# Poles of the first block, as fractions of the logarithmic range of the shifts: Chebyshev nodes stretched
-# to the largest shift, where the fields vary fastest. Least worst error over hands, combs and balls.
-_LOWEST_POLE = 0.06
 # A block is solved to this fraction of the tolerance, or of its own start: single precision ends there.
 _MARGIN, _SINGLE_LIMIT = 0.1, 1e-6
 # The estimate stands for the shifts between its own too, so it has to be this much below the tolerance.
@@ -38,9 +37,10 @@ _STORAGE_ROUNDINGS = 3.0
 # Basis directions that contribute less than this fraction of the tolerance are dropped at the end.
 _DROPPED = 1e-2
 
-# Points of the logarithmic grid that stands for a range of shifts.
-_DENSE = 200
-
+# In units of the spacing; single precision holds the square of its inverse.
+_LEAST_RHO = 1e-6
+# Rounding, not the operator, gives lower eigenvalues than this.
+_LOWEST_TRUSTED = 1e-3
 Small = NDArray[np.float64]
 
 
@@ -76,51 +76,63 @@ class Sweep:
     max_iterations: int = 100
     threads: int | None = None
 
+    def __post_init__(self) -> None:
+        if not 0 < self.rtol < 1:
+            msg = f"rtol={self.rtol:g}: expected a tolerance between 0 and 1"
+            raise ParameterError(msg)
+
     def solve(self, system: System, rho: NDArray[np.float64]) -> Solution:
-        """Solve for each ρ; the residual is the largest entry of the preconditioned true residual."""
-        try:
-            field, residual, spent, converged = self._run(system, rho)
-        except np.linalg.LinAlgError as error:  # pragma: no cover - a system that is not an M-matrix
-            raise ConvergenceError(str(error)) from error
+        """Solve for each ρ; the residual is an estimate, from the true residual, of the largest error."""
+        field, residual, spent, converged = self._run(system, rho, between=False)
         advice = f"raise rtol={self.rtol:g}, or solve directly"
         return Solution(field.fields(), np.full(rho.size, residual), converged, spent, advice)
 
     def hyperfield(self, system: System, rho: NDArray[np.float64]) -> Hyperfield:
         """Low-rank hyperfield over the range of `rho`; raises `ConvergenceError` if it misses `rtol`."""
-        field, residual, spent, converged = self._run(system, rho)
+        field, residual, spent, converged = self._run(system, rho, between=True)
         if not converged:
             advice = f"raise rtol={self.rtol:g}, or solve directly"
             Solution(field.at(rho[:1]), np.array([residual]), False, spent, advice).checked(system.shape.name)
         return field
 
-    def _run(self, system: System, rho: NDArray[np.float64]) -> tuple[Hyperfield, float, int, bool]:
+    def _run(
+        self, system: System, rho: NDArray[np.float64], *, between: bool
+    ) -> tuple[Hyperfield, float, int, bool]:
+        """Sweep for the given ρ, or for all `between` the smallest and the largest of them."""
+        unit = min(system.shape.spacing)
+        if rho.min() < _LEAST_RHO * unit:
+            msg = (
+                f"{system.shape.name}: rho={rho.min():g} is below {_LEAST_RHO:g} of the spacing {unit:g}, "
+                "where fields vanish on every node; use a larger rho or a finer spacing"
+            )
+            raise ParameterError(msg)
         with Team(self.threads) as team:
-            return self._sweep(system, rho, team)
+            return self._sweep(system, rho, team, between=between)
 
     def _sweep(
-        self, system: System, rho: NDArray[np.float64], team: Team
+        self, system: System, rho: NDArray[np.float64], team: Team, *, between: bool
     ) -> tuple[Hyperfield, float, int, bool]:
         hierarchy = Hierarchy.of(system)
         dtype = np.float32 if self.rtol > _SINGLE_STORAGE else np.float64
         basis = ReducedBasis(system, hierarchy.unit, dtype, hierarchy.levels[0].slabs, team)
-        targets = np.square(hierarchy.unit / rho[np.isfinite(rho)])
+        targets = Targets(np.square(hierarchy.unit / rho[np.isfinite(rho)]), between)
         block = _Block(hierarchy, basis, self)
         poles: list[float] = []
-        worst, converged = 0.0, targets.size == 0
+        worst, converged = 0.0, targets.shifts.size == 0
         while not converged and len(poles) < self.max_blocks * LANES:
-            shifts = _next_poles(np.array(poles), targets, basis.lowest()) if poles else _first_poles(targets)
+            shifts = targets.next(np.array(poles), basis.lowest()) if poles else targets.first()
             worst = block.measure(shifts)
             converged = bool(poles) and worst <= _ACCEPTED * self.rtol
             if not converged:
                 basis.extend(block.solve())
                 poles.extend(shifts)
         if not converged and poles:
-            worst = block.measure(_next_poles(np.array(poles), targets, basis.lowest()))
+            worst = block.measure(targets.next(np.array(poles), basis.lowest()))
             converged = worst <= _ACCEPTED * self.rtol
         iterations = block.iterations
         del block
         return (
-            _hyperfield(system, rho, basis, _dense(targets), self.rtol, worst),
+            _hyperfield(system, rho, basis, targets.dense(), self.rtol, worst),
             worst,
             iterations,
             converged,
@@ -142,6 +154,8 @@ class _Block:
             half.reshape(n + 1, LANES) for half in self.u.reshape(-1).view(np.float32).reshape(2, -1)
         )
         self.iterations = 0
+        # Lowest eigenvalue seen of the preconditioned operator: a cycle finds this part of any error.
+        self.found = 1.0
 
     def measure(self, shifts: Small) -> float:
         """Estimate the largest error of the basis at these shifts, from its preconditioned true residual."""
@@ -151,7 +165,7 @@ class _Block:
         self.cycle = Cycle(self.hierarchy, shifts, self.z, self.team)
         self.product = self.cycle.apply(self.r)
         self.team.all(kernels.peak, self.slabs, self.z, self.partial)
-        self.error = self.partial.max(axis=0)
+        self.error = self.partial.max(axis=0) / self.found
         return float(self.error.max())
 
     def solve(self) -> NDArray[np.float32]:
@@ -162,16 +176,20 @@ class _Block:
         p[:] = z
         start = rz = self.product
         goal = np.maximum(_MARGIN * self.options.rtol, _SINGLE_LIMIT * self.error)
+        steps, turns = [], []
         for _ in range(self.options.max_iterations):
             self.team.all(kernels.multiply, self.slabs, p, q, self.partial, graph, shift)
             alpha = _ratio(rz, self.partial.sum(axis=0, keepdims=True))
             self.team.all(kernels.advance, self.slabs, x, r, p, q, alpha)
             new = self.cycle.apply(r)
             self.iterations += 1
+            steps.append(alpha[0])
+            turns.append(_ratio(new, rz)[0])
             if np.all(np.sqrt(new[0]) * self.error <= goal * np.sqrt(start[0])):
                 break
-            self.team.all(kernels.turn, self.slabs, z, p, _ratio(new, rz))
+            self.team.all(kernels.turn, self.slabs, z, p, turns[-1][None])
             rz = new
+        self.found = min(self.found, _lowest_ritz(np.array(steps), np.array(turns)))
         return x
 
 
@@ -191,38 +209,17 @@ def _ratio(numerator: Small, denominator: Small) -> NDArray[np.float32]:
     return quotient.astype(np.float32)
 
 
-def _first_poles(targets: Small) -> Small:
-    """Eight shifts that span the range well; the targets themselves when they are no more than eight."""
-    distinct = np.unique(targets)
-    if distinct.size <= LANES:
-        return np.pad(distinct, (0, LANES - distinct.size), mode="edge")
-    t = np.cos((2 * np.arange(LANES) + 1) / (2 * LANES) * np.pi)
-    t = _LOWEST_POLE + (1 - _LOWEST_POLE) * (t / t[0] + 1) / 2
-    return np.asarray(distinct[0] * (distinct[-1] / distinct[0]) ** t)
+def _lowest_ritz(steps: NDArray[np.float32], turns: NDArray[np.float32]) -> float:
+    """Lowest eigenvalue of the preconditioned operator that conjugate gradients have seen in any lane.
 
-
-def _dense(targets: Small, floor: float = 0.0) -> Small:
-    """Shifts at which the error is to be small: the targets if few, else a geometric grid of s + floor."""
-    distinct = np.unique(targets)
-    if distinct.size <= LANES:
-        return distinct
-    grid = np.geomspace(distinct[0] + floor, distinct[-1] + floor, _DENSE) - floor
-    return np.clip(grid, distinct[0], distinct[-1])
-
-
-def _next_poles(poles: Small, targets: Small, floor: float) -> Small:
-    """Eight more shifts s, where the rational interpolant's ∏|s - p|/(s + p + 2λ) is largest in turn (Leja).
-
-    λ, the `floor`, is the lowest eigenvalue of the operator: fields change little with shifts far below it.
-    The largest shift, where fields vary fastest, is always among the eight: what single precision left of
-    its error shows nowhere else.
+    Step lengths and directions of conjugate gradients are the entries of the Lanczos matrix of each lane.
     """
-    candidates = _dense(targets, floor)
-    if candidates.size <= LANES:
-        return np.pad(candidates, (0, LANES - candidates.size), mode="edge")
-    chosen = list(poles)
-    for _ in range(LANES - 1):
-        distance = np.abs(np.subtract.outer(candidates, chosen))
-        ratio = distance / (np.add.outer(candidates, chosen) + 2 * floor) + np.finfo(float).tiny
-        chosen.append(candidates[int(np.argmax(np.log(ratio).sum(axis=1)))])
-    return np.array([*chosen[1 - LANES :], candidates[-1]])
+    lowest = 1.0
+    for alpha, beta in zip(steps.T.astype(float), turns.T.astype(float), strict=True):
+        count = int(np.argmin(np.append(alpha > 0, False)))
+        if count == 0:
+            continue
+        a, b = alpha[:count], beta[: count - 1]
+        diagonal = 1 / a + np.append(0.0, b / a[:-1])
+        lowest = min(lowest, scipy.linalg.eigvalsh_tridiagonal(diagonal, np.sqrt(b) / a[:-1])[0])
+    return max(float(lowest), _LOWEST_TRUSTED)
