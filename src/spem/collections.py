@@ -42,7 +42,7 @@ def encode(
     n_jobs
         Number of processes.
     work
-        Folder from which an interrupted call goes on; see `spem.codes.collection`.
+        Folder from which an interrupted call goes on; delete it when the codes are saved.
     **options
         Settings by name, in place of `settings`.
 

@@ -73,6 +73,26 @@ def test_encode_adds_to_codes(spem: Spem, folder: Path, codes: Path) -> None:
     np.testing.assert_array_equal(after.vectors[:-1], before.vectors)
 
 
+def test_work_survives_codes_that_cannot_be_saved(
+    spem: Spem, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """When saving fails the work is kept, and the same command computes no field again."""
+    from spem.codes import collection
+
+    target, work = tmp_path / "c.spem", tmp_path / "c.spem.work"
+    assert spem("encode", folder, "-o", target, *QUICK, "--n-rho", 12).exit_code == 0
+    with monkeypatch.context() as patch:
+        patch.setattr(Codes, "save", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left")))
+        result = spem("encode", folder, "-o", target, *QUICK, "--overwrite")
+    assert result.exit_code == 2
+    assert "No space left" in result.stderr
+    assert len(list(work.rglob("*.work"))) == 9
+    monkeypatch.setattr(collection, "sweep_bands", lambda *_, **__: pytest.fail("computed again"))
+    again = spem("encode", folder, "-o", target, *QUICK, "--overwrite")
+    assert again.exit_code == 0, again.stderr
+    assert not work.exists()
+
+
 def test_encode_refuses_other_settings_for_codes_there(spem: Spem, folder: Path, codes: Path) -> None:
     """Settings that contradict the codes are named; --overwrite makes them anew."""
     result = spem("encode", folder, "-o", codes, "--n-maps", "2")

@@ -13,6 +13,7 @@ from spem.codes.codes import Codes
 from spem.codes.collection import encode_collection, encode_file, merge
 from spem.codes.settings import Settings
 from spem.codes.sources import find_files, read_shapes, source_name
+from spem.codes.work import Entry, clear_work
 from spem.codes.workers import run_all
 from spem.errors import ModelError, ParameterError, ReadError, ShapeError
 from spem.shapes.shape import Shape
@@ -100,16 +101,18 @@ def test_interrupted_call_goes_on(folder: Path, tmp_path: Path, monkeypatch: pyt
     def counted(shape: Shape, settings: Settings) -> object:
         calls.append(shape.name)
         if len(calls) == 4:
-            raise KeyboardInterrupt
+            message = "stopped"
+            raise KeyboardInterrupt(message)
         return true(shape, settings)
 
     monkeypatch.setattr(collection, "sweep_bands", counted)
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt, match="stopped"):
         encode_collection(files, SETTINGS, work=work)
     assert work.is_dir()
     codes = encode_collection(files, SETTINGS, work=work)
     assert len(calls) == 4 + 3
-    assert not work.exists()
+    encode_collection(files, SETTINGS, work=work)
+    assert len(calls) == 4 + 3
     np.testing.assert_array_equal(codes.vectors, whole.vectors)
 
 
@@ -117,8 +120,8 @@ def test_damaged_work_is_done_again(folder: Path, tmp_path: Path, monkeypatch: p
     """A truncated file of the work folder is replaced, not believed."""
     files, work = find_files([folder]), tmp_path / "codes.work"
     with monkeypatch.context() as patch:
-        patch.setattr(collection, "_fit", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
-        with pytest.raises(KeyboardInterrupt):
+        patch.setattr(collection, "_fit", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt("stopped")))
+        with pytest.raises(KeyboardInterrupt, match="stopped"):
             encode_collection(files, SETTINGS, work=work)
     done = sorted(work.rglob("*.work"))
     done[0].write_bytes(done[0].read_bytes()[:200])
@@ -131,6 +134,24 @@ def test_other_settings_do_not_share_work(folder: Path, tmp_path: Path) -> None:
     one = collection.Work.open(tmp_path, SETTINGS)
     assert one == collection.Work.open(tmp_path, Settings(**(SETTINGS.to_json() | {"seed": 5})))
     assert one != collection.Work.open(tmp_path, Settings(**(SETTINGS.to_json() | {"n_rho": 17})))
+
+
+def test_work_is_cleared_and_nothing_else(tmp_path: Path) -> None:
+    """Work of all settings and torn files go; what somebody else put there stays, with its folders."""
+    root = tmp_path / "mine"
+    one = collection.Work.open(root, SETTINGS)
+    two = collection.Work.open(root, Settings())
+    for work in (one, two):
+        work.save("ab", [Entry("")])
+        (work.folder / ".cd.work.0123").write_bytes(b"torn")
+    (root / "notes").mkdir()
+    (root / "notes" / "a.work").write_text("mine")
+    (two.folder / "mine.txt").write_text("mine")
+    clear_work(root)
+    left = {path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_file()}
+    assert left == {"notes/a.work", f"{two.folder.name}/mine.txt"}
+    assert not one.folder.exists()
+    clear_work(tmp_path / "none")
 
 
 def test_known_codes_are_taken_over(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -175,6 +175,7 @@ def encode_paths(
     from spem.codes.codes import Codes
     from spem.codes.collection import encode_collection, merge
     from spem.codes.sources import find_files
+    from spem.codes.work import clear_work
     from spem.fields.solvers.team import usable_threads
 
     files = [path for path in find_files(paths) if path.absolute() != output.absolute()]
@@ -206,6 +207,7 @@ def encode_paths(
     if known is not None:
         codes = merge(known, codes)
     codes.save(output)
+    clear_work(work)
     return codes, n_failed
 
 

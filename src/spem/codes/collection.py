@@ -61,8 +61,9 @@ def encode_collection(
     n_jobs
         Number of processes.
     work
-        Folder in which what is done survives an interruption; the same call goes on from it, and
-        it is removed at the end. Without it nothing survives.
+        Folder in which what is done survives an interruption; the same call goes on from it. It stays
+        until `spem.codes.work.clear_work`, for which the time is when the codes are saved. Without it
+        nothing survives.
     progress
         Called with a stage (``"fields"``, ``"codes"``), the number of sources done and of all.
     on_failure
@@ -99,10 +100,7 @@ def encode_collection(
         wanted = {key: source for key, source in listing.first.items() if key not in reused}
         _compute(wanted, _Task(folder, chosen, model), n_jobs, listing, progress or (lambda *_: None))
         fitted = model or _fit(folder, [key for key in wanted if key not in listing.broken], chosen)
-        codes = _assemble(listing, folder, reused, fitted, progress or (lambda *_: None))
-        if work is not None:
-            folder.remove()
-    return codes
+        return _assemble(listing, folder, reused, fitted, progress or (lambda *_: None))
 
 
 def encode_file(source: str | Path | Shape, model: Model) -> NDArray[np.float32]:

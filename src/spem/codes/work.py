@@ -1,9 +1,9 @@
-"""The work folder of a collection: what each source came to, kept until the whole is done."""
+"""The work folder of a collection: what each source came to, kept until the codes are saved."""
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,9 @@ from spem.codes.settings import Settings
 from spem.errors import ParameterError, SpemError
 
 _KIND = "work"
+_SUFFIX = ".work"
+# Length of the digest that a folder of work is named by.
+_DIGITS, _HEX = 12, set("0123456789abcdef")
 # Settings that change codes but not the features that they are made of.
 _LATER = ("n_centers", "power", "scaling", "moments", "nodes_per_shape", "seed")
 
@@ -56,13 +59,16 @@ class Work:
     def open(cls, root: Path, settings: Settings, model: Model | None = None) -> Work:
         """Make the folder under `root` that belongs to these settings, or to this model.
 
+        Its name tells settings, their ``code_format`` and the version of spem apart; a change of the
+        source that raises neither is not seen, and work from before it is believed.
+
         Raises
         ------
         ParameterError
             When the folder cannot be made.
         """
         values = {key: value for key, value in settings.to_json().items() if key not in _LATER}
-        digest = content_hash({"features": values}, {})[:12] if model is None else model.digest
+        digest = content_hash({"features": values}, {})[:_DIGITS] if model is None else model.digest
         folder = root / digest
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -83,7 +89,7 @@ class Work:
         """Write what a source came to, in one step."""
         header = {"shapes": [[entry.suffix, entry.reason, len(entry.arrays)] for entry in entries]}
         arrays = {f"{i}.{j}": a for i, entry in enumerate(entries) for j, a in enumerate(entry.arrays)}
-        write_container(self.folder / f"{key}.work", _KIND, header, arrays)
+        write_container(self.folder / f"{key}{_SUFFIX}", _KIND, header, arrays)
 
     def load(self, key: str) -> list[Entry]:
         """Read what a source came to.
@@ -93,7 +99,7 @@ class Work:
         ReadError
             When it is not there, or damaged.
         """
-        header, arrays = read_container(self.folder / f"{key}.work", _KIND)
+        header, arrays = read_container(self.folder / f"{key}{_SUFFIX}", _KIND)
         return [
             Entry(suffix, reason, tuple(np.asarray(arrays[f"{i}.{j}"]) for j in range(count)))
             for i, (suffix, reason, count) in enumerate(header["shapes"])
@@ -108,8 +114,33 @@ class Work:
                     left -= 1
                     yield entry.arrays
 
-    def remove(self) -> None:
-        """Delete the folder, and the one above when it is empty."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-        if self.folder.parent.is_dir() and not any(self.folder.parent.iterdir()):
-            self.folder.parent.rmdir()
+
+def clear_work(root: str | Path) -> None:
+    """Delete the work of all settings and models below a folder, once the codes are saved.
+
+    What spem did not write stays, and the folders that hold it; those left empty go, `root` too.
+
+    Parameters
+    ----------
+    root
+        The work folder; nothing is done where it is not there.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Work.open(Path(folder, "work"), Settings())
+    ...     clear_work(Path(folder, "work"))
+    ...     Path(folder, "work").exists()
+    False
+    """
+    top = Path(root)
+    folders = [path for path in top.glob("?" * _DIGITS) if path.is_dir() and not set(path.name) - _HEX]
+    for folder in folders:
+        # A name that goes on after the suffix is of a file whose writing was cut off.
+        for file in (*folder.glob(f"*{_SUFFIX}"), *folder.glob(f".*{_SUFFIX}.*")):
+            file.unlink(missing_ok=True)
+    for folder in (*folders, top):
+        # The folder holds something else, or is gone.
+        with suppress(OSError):
+            folder.rmdir()
