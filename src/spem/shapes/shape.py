@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import ParameterError, ShapeError
+from spem.shapes.grids import spacing_per_axis
 
 # A cut closer to a node than this fraction of an edge is moved there: the field changes by at
 # most this fraction of its variation along one edge, and the diagonal of the operator stays finite.
 MIN_FRACTION = 1e-6
 # Where nothing more is known, the surface lies on the face between an inside and an outside voxel.
 FACE_FRACTION = 0.5
+_MAX_DIRECTION = np.iinfo(np.uint8).max
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,11 @@ class Cuts:
         higher indices.
     fraction
         ``(n_cuts,)`` distance from the voxel's centre to the surface, in edges, in (0, 1].
+
+    Raises
+    ------
+    ParameterError
+        When a number is out of range, the arrays differ in length, or an edge is listed twice.
     """
 
     voxel: NDArray[np.int64]
@@ -42,14 +49,30 @@ class Cuts:
     fraction: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        order = np.lexsort((self.direction, self.voxel))
-        fraction = np.asarray(self.fraction, np.float64)[order]
+        voxel, direction = _whole(self.voxel, "voxel"), _whole(self.direction, "direction")
+        fraction = np.asarray(self.fraction, np.float64)
+        if not voxel.shape == direction.shape == fraction.shape or voxel.ndim != 1:
+            shapes = f"{voxel.shape}, {direction.shape} and {fraction.shape}"
+            msg = f"cuts: expected voxel, direction and fraction of one length, got {shapes}"
+            raise ParameterError(msg)
         if not np.all((fraction > 0) & (fraction <= 1)):
             msg = "cut fractions must lie in (0, 1]"
             raise ParameterError(msg)
-        object.__setattr__(self, "voxel", np.asarray(self.voxel, np.int64)[order])
-        object.__setattr__(self, "direction", np.asarray(self.direction, np.uint8)[order])
-        object.__setattr__(self, "fraction", np.maximum(fraction, MIN_FRACTION))
+        if direction.size and not 0 <= direction.min() <= direction.max() <= _MAX_DIRECTION:
+            stray = direction.min() if direction.min() < 0 else direction.max()
+            msg = f"cuts: direction {stray}, expected 0 to {_MAX_DIRECTION}"
+            raise ParameterError(msg)
+        order = np.lexsort((direction, voxel))
+        voxel, direction = voxel[order], direction[order]
+        twice = (voxel[1:] == voxel[:-1]) & (direction[1:] == direction[:-1])
+        if twice.any():
+            first = int(np.argmax(twice))
+            edge = f"voxel {voxel[first]}, direction {direction[first]}"
+            msg = f"cuts: {edge} is listed twice; give each edge once"
+            raise ParameterError(msg)
+        object.__setattr__(self, "voxel", voxel)
+        object.__setattr__(self, "direction", direction.astype(np.uint8))
+        object.__setattr__(self, "fraction", np.maximum(fraction[order], MIN_FRACTION))
 
     @classmethod
     def none(cls) -> Self:
@@ -114,6 +137,13 @@ class Shape:
         What was read and what was done to it.
     affine
         ``(d + 1, d + 1)`` map from array index of the *source* to world coordinates, or None.
+
+    Raises
+    ------
+    ShapeError
+        When no voxel is inside, or one of the outermost layer is.
+    ParameterError
+        When spacing, origin or cuts do not fit the mask.
     """
 
     mask: NDArray[np.bool_]
@@ -139,6 +169,7 @@ class Shape:
         if not self.mask.any():
             msg = f"{self.name}: no voxel centre lies inside the shape; use a finer spacing"
             raise ShapeError(msg)
+        _check_cuts(self.mask, self.cuts, self.name)
 
     @classmethod
     def from_mask(
@@ -170,6 +201,13 @@ class Shape:
         **rest
             `report` and `affine`, passed on.
 
+        Raises
+        ------
+        ShapeError
+            When nothing is inside.
+        ParameterError
+            When spacing or cuts do not fit the mask.
+
         Examples
         --------
         >>> import numpy as np
@@ -181,13 +219,14 @@ class Shape:
             msg = f"{name}: no voxel centre lies inside the shape; use a finer spacing"
             raise ShapeError(msg)
         d = inside.ndim
-        steps = (float(spacing),) * d if np.isscalar(spacing) else tuple(map(float, spacing))  # type: ignore[arg-type]
+        steps = spacing_per_axis(spacing, d, name)
         start = (0.0,) * d if origin is None else tuple(map(float, origin))
         low, high = _bounding_box(inside)
         framed = np.zeros(tuple(high - low + 2), bool)
         framed[(slice(1, -1),) * d] = inside[tuple(map(slice, low, high))]
         moved = tuple(o + h * (int(i) - 1) for o, h, i in zip(start, steps, low, strict=True))
         if cuts is not None and len(cuts):
+            _check_ends(inside, cuts, name)
             index = np.array(np.unravel_index(cuts.voxel, inside.shape)) - (low - 1)[:, None]
             voxel = np.ravel_multi_index(tuple(index), framed.shape)
             cuts = Cuts(voxel, cuts.direction, cuts.fraction)
@@ -259,3 +298,51 @@ def _bounding_box(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[n
         low.append(hit[0])
         high.append(hit[-1] + 1)
     return np.array(low), np.array(high)
+
+
+def _whole(values: ArrayLike, what: str) -> NDArray[np.int64]:
+    """Return whole numbers as such."""
+    numbers = np.asarray(values)
+    if numbers.size and numbers.dtype.kind not in "iu":
+        msg = f"cuts: {what} must hold whole numbers, got {numbers.dtype}"
+        raise ParameterError(msg)
+    return numbers.astype(np.int64)
+
+
+def _check_ends(mask: NDArray[np.bool_], cuts: Cuts, name: str) -> None:
+    """Refuse cuts that leave no inside voxel of the mask, or leave it in no direction of its grid."""
+    voxel, d = cuts.voxel, mask.ndim
+    # sorted by voxel, so the ends are the extremes
+    if len(cuts) and (voxel[0] < 0 or voxel[-1] >= mask.size):
+        stray = voxel[0] if voxel[0] < 0 else voxel[-1]
+        msg = f"{name}: a cut leaves voxel {stray}, expected 0 to {mask.size - 1}, as the mask has"
+        raise ParameterError(msg)
+    within = mask.ravel()[voxel]
+    if not within.all():
+        msg = f"{name}: a cut leaves voxel {voxel[np.argmin(within)]}, which is outside; list it from inside"
+        raise ParameterError(msg)
+    if len(cuts) and cuts.direction.max() >= 2 * d:
+        msg = f"{name}: a cut has direction {cuts.direction.max()}, expected 0 to {2 * d - 1} in {d}-D"
+        raise ParameterError(msg)
+
+
+def _check_cuts(mask: NDArray[np.bool_], cuts: Cuts, name: str) -> None:
+    """Refuse cuts that do not fit a framed mask; an edge between inside voxels is cut from both ends."""
+    _check_ends(mask, cuts, name)
+    d = mask.ndim
+    strides = [int(np.prod(mask.shape[axis + 1 :])) for axis in range(d)]
+    signed = np.array([sign * stride for stride in strides for sign in (-1, 1)])  # by direction
+    end = cuts.voxel + signed[cuts.direction]
+    between = np.flatnonzero(mask.ravel()[end])
+    if not between.size:
+        return
+    direction = cuts.direction[between].astype(np.int64)
+    listed = cuts.voxel[between] * (2 * d) + direction
+    answered = np.isin(end[between] * (2 * d) + (direction ^ 1), listed)
+    if not answered.all():
+        lone = int(between[np.argmin(answered)])
+        msg = (
+            f"{name}: the edge between inside voxels {cuts.voxel[lone]} and {end[lone]} is cut from the "
+            "first alone; list the cut from the other side too"
+        )
+        raise ParameterError(msg)
