@@ -68,11 +68,7 @@ def encode(
     if options and (settings is not None or model is not None):
         msg = f"{', '.join(options)}: a model or settings were given too; give one or the other"
         raise ParameterError(msg)
-    try:
-        chosen = Settings(**options) if options else settings
-    except TypeError as error:
-        msg = f"{', '.join(options)}: not all are settings of a code ({error})"
-        raise ParameterError(msg) from error
+    chosen = Settings.of(options) if options else settings
     given = [sources] if isinstance(sources, (str, Path, Shape)) else list(sources)
     listed: list[str | Path | Shape] = []
     for source in given:

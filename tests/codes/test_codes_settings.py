@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from spem.codes.settings import CODE_FORMAT, Settings
@@ -19,14 +20,30 @@ def test_settings_survive_json():
 @pytest.mark.parametrize(
     ("bad", "message"),
     [
-        ({"voxels": 0}, "voxels=0 must be at least 1"),
+        ({"voxels": 0}, "voxels=0 must be a whole number of at least 1"),
+        ({"voxels": 2.5}, "voxels=2.5 must be a whole number"),
+        ({"voxels": True}, "voxels=True must be a whole number"),
+        ({"n_centers": 3.5}, "n_centers=3.5 must be a whole number"),
+        ({"n_rho": None}, "n_rho=None must be a whole number"),
+        ({"seed": -1}, "seed=-1 must be a whole number from 0 to 4294967295"),
+        ({"seed": "x"}, "seed='x' must be a whole number"),
+        ({"threshold": float("nan")}, "threshold=nan must be a finite number"),
+        ({"threshold": "low"}, "threshold='low' must be a finite number"),
+        ({"power": float("nan")}, "power=nan must be a finite number"),
+        ({"power": None}, "power=None must be a finite number"),
+        ({"dark": "no"}, "dark='no' must be True or False"),
+        ({"centred": 1}, "centred=1 must be True or False"),
+        ({"n_rho": 4}, "n_maps=8 must be at most n_rho=4"),
+        ({"rho_ranges": (1, 2)}, r"rho_ranges=\(1, 2\) must be pairs"),
+        ({"rho_ranges": ((1,),)}, "must be pairs"),
+        ({"rho_ranges": None}, "must be pairs"),
         ({"n_maps": 0}, "n_maps=0"),
         ({"rho_ranges": ((0.3, 0.1),)}, "0 < low < high < inf"),
         ({"rho_ranges": ((0.3, float("inf")),)}, "0 < low < high < inf"),
         ({"rho_ranges": ()}, "empty"),
         ({"boundary": "face"}, "must be one of surface, voxel"),
         ({"scaling": True}, "must be one of standard, whiten, deviation, none"),
-        ({"moments": 0}, "moments=0 must be 1 or 2"),
+        ({"moments": 0}, "moments=0 must be a whole number from 1 to 2"),
         ({"scheme": "cubic"}, "must be one of linear, squared, log"),
         ({"power": -0.1}, "must lie in"),
     ],
@@ -35,6 +52,18 @@ def test_settings_out_of_range_are_refused(bad, message):
     """Each setting is checked when it is made."""
     with pytest.raises(ParameterError, match=message):
         Settings(**bad)
+
+
+def test_numbers_of_numpy_are_settings():
+    """Numbers of NumPy are taken, and kept as plain ones that JSON can write."""
+    made = Settings(voxels=np.int64(900), power=np.float32(0.5), dark=np.bool_(True), seed=np.uint8(3))
+    assert Settings.from_json(json.loads(json.dumps(made.to_json()))) == made == Settings.of(made.to_json())
+
+
+def test_option_that_is_no_setting_is_named():
+    """Of several options only the unknown one is blamed."""
+    with pytest.raises(ParameterError, match=r"^nope: no setting of a code; expected any of voxels, "):
+        Settings.of({"voxels": 900, "nope": 1})
 
 
 @pytest.mark.parametrize(

@@ -3,21 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields
+from functools import partial
 from importlib.metadata import version
 from typing import Any, Literal, Self, get_args
 
+from spem.codes.arguments import finite_number, truth_value, whole_number
 from spem.codes.normalise import Scaling
 from spem.errors import ModelError, ParameterError
+from spem.fields.operator import Boundary
+from spem.fields.rho import DEFAULT_COUNT, DEFAULT_RANGE, Scheme
+from spem.shapes.limits import DEFAULT_VOXELS
 
 # Raised whenever the same file would get another code under the same settings.
 CODE_FORMAT = 1
 
-BoundaryKind = Literal["surface", "voxel"]
-SchemeKind = Literal["linear", "squared", "log"]
-ComponentsKind = Literal["largest", "all"]
-_CHOICES = {"boundary": BoundaryKind, "scheme": SchemeKind, "components": ComponentsKind, "scaling": Scaling}
+Components = Literal["largest", "all"]
+_CHOICES = {"boundary": Boundary, "scheme": Scheme, "components": Components, "scaling": Scaling}
+_CHECKS: dict[str, Callable[[str, Any], Any]] = {
+    **dict.fromkeys(("voxels", "n_rho", "n_maps", "n_centers", "nodes_per_shape"), whole_number),
+    "moments": partial(whole_number, largest=2),
+    # k-means takes seeds of 32 bits.
+    "seed": partial(whole_number, least=0, largest=2**32 - 1),
+    **dict.fromkeys(("threshold", "power"), finite_number),
+    **dict.fromkeys(("dark", "centred", "drop_boundary"), truth_value),
+}
+_OPTIONAL = ("voxels", "threshold", "dark")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,14 +84,14 @@ class Settings:
     250000
     """
 
-    voxels: int | None = 15_000
+    voxels: int | None = DEFAULT_VOXELS
     threshold: float | None = None
     dark: bool | None = None
-    components: ComponentsKind = "largest"
-    boundary: BoundaryKind = "surface"
-    rho_ranges: tuple[tuple[float, float], ...] = ((0.0255, 0.255),)
-    scheme: SchemeKind = "linear"
-    n_rho: int = 64
+    components: Components = "largest"
+    boundary: Boundary = "surface"
+    rho_ranges: tuple[tuple[float, float], ...] = (DEFAULT_RANGE,)
+    scheme: Scheme = "linear"
+    n_rho: int = DEFAULT_COUNT
     n_maps: int = 8
     centred: bool = False
     drop_boundary: bool = False
@@ -93,32 +105,42 @@ class Settings:
     spem_version: str = version("spem")
 
     def __post_init__(self) -> None:
-        ranges = tuple((float(low), float(high)) for low, high in self.rho_ranges)
-        object.__setattr__(self, "rho_ranges", ranges)
-        for low, high in ranges:
-            if not 0 < low < high < math.inf:
-                msg = (
-                    f"rho range ({low:g}, {high:g}) needs 0 < low < high < inf, in units of the shape's size"
-                )
-                raise ParameterError(msg)
-        if not ranges:
-            msg = "rho_ranges is empty; give at least one (low, high)"
-            raise ParameterError(msg)
-        for name in ("voxels", "n_rho", "n_maps", "n_centers", "nodes_per_shape"):
+        object.__setattr__(self, "rho_ranges", _as_ranges(self.rho_ranges))
+        for name, check in _CHECKS.items():
             value = getattr(self, name)
-            if value is not None and value < 1:
-                msg = f"{name}={value} must be at least 1"
-                raise ParameterError(msg)
+            if value is not None or name not in _OPTIONAL:
+                object.__setattr__(self, name, check(name, value))
         for name, kind in _CHOICES.items():
             if getattr(self, name) not in get_args(kind):
                 msg = f"{name}={getattr(self, name)!r} must be one of {', '.join(get_args(kind))}"
                 raise ParameterError(msg)
-        if self.moments not in (1, 2):
-            msg = f"moments={self.moments!r} must be 1 or 2"
-            raise ParameterError(msg)
         if not 0 <= self.power <= 1:
             msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"
             raise ParameterError(msg)
+        if self.n_maps > self.n_rho:
+            msg = f"n_maps={self.n_maps} must be at most n_rho={self.n_rho}, the number of ρ in each range"
+            raise ParameterError(msg)
+
+    @classmethod
+    def of(cls, options: Mapping[str, Any]) -> Self:
+        """Make settings of options by name.
+
+        Raises
+        ------
+        ParameterError
+            When one is out of its range, or of a name that is no setting.
+
+        Examples
+        --------
+        >>> Settings.of({"n_maps": 4}).n_maps
+        4
+        """
+        known = [entry.name for entry in fields(cls)]
+        unknown = ", ".join(name for name in options if name not in known)
+        if unknown:
+            msg = f"{unknown}: no setting of a code; expected any of {', '.join(known)}"
+            raise ParameterError(msg)
+        return cls(**options)
 
     @classmethod
     def paper(cls, **changes: Any) -> Self:
@@ -180,3 +202,20 @@ class Settings:
         except (TypeError, ValueError) as error:
             msg = f"{source}: settings are damaged ({error}); make it again"
             raise ModelError(msg) from error
+
+
+def _as_ranges(ranges: Any) -> tuple[tuple[float, float], ...]:
+    """Check the ranges of ρ."""
+    try:
+        pairs = tuple((float(low), float(high)) for low, high in ranges)
+    except (TypeError, ValueError) as error:
+        msg = f"rho_ranges={ranges!r} must be pairs (low, high), such as [(0.025, 0.25)]"
+        raise ParameterError(msg) from error
+    for low, high in pairs:
+        if not 0 < low < high < math.inf:
+            msg = f"rho range ({low:g}, {high:g}) needs 0 < low < high < inf, in units of the shape's size"
+            raise ParameterError(msg)
+    if not pairs:
+        msg = "rho_ranges is empty; give at least one (low, high)"
+        raise ParameterError(msg)
+    return pairs

@@ -14,7 +14,8 @@ from joblib import Parallel, delayed, parallel_config
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 from threadpoolctl import threadpool_limits
 
-from spem.errors import ParameterError, SpemError
+from spem.codes.arguments import whole_number
+from spem.errors import SpemError
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -65,9 +66,7 @@ def run_all(work: Callable[[T], R], tasks: Iterable[T], n_jobs: int = 1) -> Iter
     >>> [(result, reason) for _, result, reason in run_all(int, ["7"])]
     [(7, '')]
     """
-    if n_jobs < 1:
-        msg = f"n_jobs={n_jobs} must be at least 1"
-        raise ParameterError(msg)
+    n_jobs = whole_number("n_jobs", n_jobs)
     left = dict(enumerate(tasks))
     if n_jobs == 1 or len(left) <= 1:
         with threadpool_limits(1):

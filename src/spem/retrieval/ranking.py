@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from spem.codes.arguments import whole_number
 from spem.codes.codes import Codes
-from spem.errors import ParameterError
 from spem.retrieval.distances import correlation_distance
 
 
@@ -65,11 +65,9 @@ def rank(query: ArrayLike, codes: Codes, k: int | None = 10) -> list[Answer]:
     >>> [(answer.rank, answer.name) for answer in rank(vectors[1], codes)]
     [(1, 'b'), (2, 'a')]
     """
-    if k is not None and k < 1:
-        msg = f"k={k} must be at least 1"
-        raise ParameterError(msg)
+    count = None if k is None else whole_number("k", k)
     distances = correlation_distance(np.atleast_2d(np.asarray(query, float)), codes.vectors)[0]
-    order = np.argsort(distances, kind="stable")[:k]
+    order = np.argsort(distances, kind="stable")[:count]
     return [
         Answer(place, codes.names[i], codes.paths[i], float(distances[i])) for place, i in enumerate(order, 1)
     ]
