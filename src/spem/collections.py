@@ -54,9 +54,9 @@ def encode(
     Raises
     ------
     ReadError
-        When no source gave a shape.
+        When no source gave a shape; it carries the failures.
     ParameterError
-        When a setting is out of its range, or unknown.
+        When there is no source, or a setting is out of its range or unknown.
 
     Examples
     --------

@@ -14,6 +14,7 @@ Each message is one line: what is wrong, where, what was expected, what to do.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 
@@ -22,7 +23,19 @@ class SpemError(Exception):
 
 
 class ReadError(SpemError):
-    """A file that is missing, empty, truncated or of a kind that spem cannot read."""
+    """A file that is missing, empty, truncated or of a kind that spem cannot read.
+
+    Parameters
+    ----------
+    message
+        One line: which file, what is wrong with it, what to do.
+    failures
+        Of a collection that gave no shape at all: why each of its files did not.
+    """
+
+    def __init__(self, message: str, failures: Sequence[Any] = ()) -> None:
+        super().__init__(message)
+        self.failures = tuple(failures)
 
 
 class ShapeError(SpemError):

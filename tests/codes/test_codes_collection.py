@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -88,8 +89,28 @@ def test_unexpected_exception_is_one_failure(folder: Path, monkeypatch: pytest.M
 def test_nothing_to_code_is_an_error(tmp_path: Path) -> None:
     """A collection without one readable shape is refused."""
     (tmp_path / "a.npy").write_bytes(b"")
-    with pytest.raises(ReadError, match="no shape could be read"):
-        encode_collection([tmp_path / "a.npy"], SETTINGS)
+    message = r"no shape could be read.*: .*b\.npy: cannot be read .* \(and 1 more\)$"
+    with pytest.raises(ReadError, match=message) as caught:
+        encode_collection([tmp_path / "a.npy", tmp_path / "b.npy"], SETTINGS)
+    assert [Path(failure.path).name for failure in caught.value.failures] == ["b.npy", "a.npy"]
+    with pytest.raises(ParameterError, match="no sources were given"):
+        encode_collection([], SETTINGS)
+
+
+def test_volume_whose_labels_all_fail_tells_why(tmp_path: Path) -> None:
+    """When every label of the only volume fails, the error has the reason of the first."""
+    np.save(tmp_path / "teeth.npy", np.diag([2, 0, 5, 0])[:, :, None] * np.ones(3, int))
+    with pytest.raises(ReadError, match=r"no codes: .*teeth\.npy: 2: .*next to the boundary"):
+        encode_collection([tmp_path / "teeth.npy"], replace(SETTINGS, drop_boundary=True))
+
+
+def test_merge_knows_a_file_by_its_place(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Relative, absolute and indirect paths are of one file; a link to it is another."""
+    (folder / "link.npy").symlink_to(folder / "e0.npy")
+    known = encode_collection([folder / "e0.npy", folder / "e1.npy", folder / "link.npy"], SETTINGS)
+    monkeypatch.chdir(folder)
+    again = merge(known, encode_collection(["e0.npy", "../shapes/e1.npy"], model=known.model))
+    assert again.paths == (str(folder / "link.npy"), "e0.npy", "../shapes/e1.npy")
 
 
 def test_interrupted_call_goes_on(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -213,9 +234,17 @@ def test_find_files_knows_folders_patterns_and_files(folder: Path) -> None:
     assert find_files([folder / "notes.txt"]) == [folder / "notes.txt"]
 
 
-@pytest.mark.parametrize(("path", "message"), [("*.obj", "no file fits"), (".", "no shape in this folder")])
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("*.obj", "no file fits this pattern; give a folder, or a pattern of files"),
+        (".", "no shape in this folder"),
+        ("f*", "only folders fit this pattern; give one, or a pattern"),
+    ],
+)
 def test_find_files_refuses_what_leads_to_nothing(tmp_path: Path, path: str, message: str) -> None:
     """A pattern or folder without a shape is an error that says so."""
+    (tmp_path / "folder").mkdir()
     with pytest.raises(ReadError, match=message):
         find_files([tmp_path / path])
 

@@ -32,6 +32,10 @@ class Failure:
     path: str
     reason: str
 
+    def __str__(self) -> str:
+        said = self.reason.startswith(self.path)
+        return self.reason if said else f"{self.path}: {self.reason}"
+
 
 @dataclass(frozen=True, eq=False)
 class Codes:

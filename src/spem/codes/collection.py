@@ -21,12 +21,11 @@ from spem.codes.settings import Settings
 from spem.codes.sources import Source, as_source, read_shapes, source_name, source_path
 from spem.codes.work import Entry, Work
 from spem.codes.workers import one_line, run_all
-from spem.errors import ModelError, ReadError, ShapeError, SpemError
+from spem.errors import ModelError, ParameterError, ReadError, ShapeError, SpemError
 from spem.shapes.shape import Shape
 
 # Training shapes beyond these change the vocabulary by less than another seed does; they bound the memory.
 TRAINING_SHAPES = 1000
-_NOTHING = "no shape could be read, so there are no codes; see the failures"
 
 Progress = Callable[[str, int, int], None]
 
@@ -77,7 +76,9 @@ def encode_collection(
     Raises
     ------
     ReadError
-        When no source gave a shape.
+        When no source gave a shape; it carries the failures.
+    ParameterError
+        When there is no source.
     ModelError
         When `settings`, `model` and `known` do not go together.
 
@@ -88,6 +89,9 @@ def encode_collection(
     >>> codes.names, codes.vectors.shape
     (('square 9', 'square 12'), (2, 16))
     """
+    if not sources:
+        msg = "no sources were given; give files or shapes"
+        raise ParameterError(msg)
     if known is not None:
         model = known.model if model is None else model
         known.require_same_model(model, "the vocabulary")
@@ -99,7 +103,7 @@ def encode_collection(
         folder = Work.open(root, chosen, model)
         wanted = {key: source for key, source in listing.first.items() if key not in reused}
         _compute(wanted, _Task(folder, chosen, model), n_jobs, listing, progress or (lambda *_: None))
-        fitted = model or _fit(folder, [key for key in wanted if key not in listing.broken], chosen)
+        fitted = model or _fit(folder, [key for key in wanted if key not in listing.broken], chosen, listing)
         return _assemble(listing, folder, reused, fitted, progress or (lambda *_: None))
 
 
@@ -143,7 +147,7 @@ def encode_file(source: str | Path | Shape, model: Model) -> NDArray[np.float32]
 
 
 def merge(existing: Codes, new: Codes) -> Codes:
-    """Return codes with new ones added; those of the same files are replaced.
+    """Return codes with new ones added; those of the same files, however named, are replaced.
 
     Parameters
     ----------
@@ -162,10 +166,16 @@ def merge(existing: Codes, new: Codes) -> Codes:
     >>> len(merge(codes, codes))
     1
     """
-    given = {*new.paths, *(failure.path for failure in new.failures)}
-    stays = existing.take([i for i, path in enumerate(existing.paths) if path not in given])
-    failures = tuple(failure for failure in existing.failures if failure.path not in given)
+    given = {_place(path) for path in (*new.paths, *(failure.path for failure in new.failures))}
+    stays = existing.take([i for i, path in enumerate(existing.paths) if _place(path) not in given])
+    failures = tuple(failure for failure in existing.failures if _place(failure.path) not in given)
     return replace(stays, failures=failures).join(new)
+
+
+def _place(path: str) -> Path:
+    """Return where a file lies, whatever folder its path starts from; a link to a file is one of its own."""
+    file = Path(path)
+    return file.parent.resolve() / file.name
 
 
 @dataclass(frozen=True)
@@ -188,7 +198,13 @@ def _entries(source: Source, settings: Settings, model: Model | None) -> list[En
         if isinstance(shape, SpemError):
             entries.append(Entry(suffix, one_line(shape)))
             continue
-        bands = node_features(sweep_bands(shape, settings), settings)
+        try:
+            bands = node_features(sweep_bands(shape, settings), settings)
+        except SpemError as error:
+            if not suffix:
+                raise
+            entries.append(Entry(suffix, one_line(error)))
+            continue
         entries.append(Entry(suffix, arrays=bands if model is None else (model.encode(bands, shape.name),)))
     return entries
 
@@ -207,10 +223,13 @@ def _compute(
         progress("fields", done, len(wanted))
 
 
-def _fit(folder: Work, keys: list[str], settings: Settings) -> Model:
+def _fit(folder: Work, keys: list[str], settings: Settings, listing: Listing) -> Model:
     """Learn a vocabulary from a sample of the sources, chosen and ordered by their content."""
-    if not keys:
-        raise ReadError(_NOTHING)
+    if not any(entry.arrays for key in keys for entry in folder.load(key)):
+        for key in keys:
+            for entry in folder.load(key):
+                listing.fail(listing.first[key], _label_reason(entry))
+        raise _nothing(listing)
     ranked = sorted(keys, key=lambda key: hashlib.sha256(f"{settings.seed} {key}".encode()).digest())
     with threadpool_limits(1):
         return Model.fit(settings, folder.features(ranked, TRAINING_SHAPES))
@@ -229,7 +248,7 @@ def _assemble(
             coded[key] = [_coded(entry, model) for entry in folder.load(key)]
         for entry in coded[key]:
             if entry.reason:
-                listing.fail(source, f"{entry.suffix.lstrip('-')}: {entry.reason}")
+                listing.fail(source, _label_reason(entry))
                 continue
             names.append(source_name(source) + entry.suffix)
             paths.append(source_path(source))
@@ -237,8 +256,20 @@ def _assemble(
             vectors.append(entry.arrays[0])
         progress("codes", done, len(listing.sources))
     if not vectors:
-        raise ReadError(_NOTHING)
+        raise _nothing(listing)
     return Codes(tuple(names), tuple(paths), tuple(hashes), np.stack(vectors), model, tuple(listing.failures))
+
+
+def _label_reason(entry: Entry) -> str:
+    """Say which label of a source gave nothing, and why."""
+    return f"{entry.suffix.lstrip('-')}: {entry.reason}"
+
+
+def _nothing(listing: Listing) -> ReadError:
+    """Say that there is nothing to make codes of, and why of the first source."""
+    first, *others = listing.failures
+    more = f" (and {len(others)} more)" if others else ""
+    return ReadError(f"no shape could be read, so there are no codes: {first}{more}", listing.failures)
 
 
 def _coded(entry: Entry, model: Model) -> Entry:

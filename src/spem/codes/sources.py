@@ -69,10 +69,16 @@ def find_files(paths: Iterable[str | Path]) -> list[Path]:
             found[path] = None
         else:
             hits = sorted(Path(hit) for hit in glob.glob(str(given), recursive=True))  # noqa: PTH207
-            if not hits:
-                msg = f"{given}: no file fits this pattern; check it, or give a folder"
+            files = [hit for hit in hits if hit.is_file()]
+            if not files:
+                why = (
+                    "only folders fit this pattern; give one"
+                    if hits
+                    else "no file fits this pattern; give a folder"
+                )
+                msg = f"{given}: {why}, or a pattern of files such as 'shapes/**/*.obj'"
                 raise ReadError(msg)
-            found |= dict.fromkeys(hit for hit in hits if hit.is_file())
+            found |= dict.fromkeys(files)
     return list(found)
 
 
