@@ -15,7 +15,11 @@ import pytest
 from typer.testing import Result
 
 from spem.codes.codes import Codes
+from spem.codes.collection import encode_collection
 from spem.codes.container import read_container, write_container
+from spem.codes.settings import Settings
+from spem.codes.sources import find_files
+from spem.fields.rho import squared
 
 Spem = Callable[..., Result]
 Start = Callable[..., subprocess.Popen[str]]
@@ -121,6 +125,7 @@ def test_vocabulary_is_saved_and_reused(spem: Spem, folder: Path, codes: Path, t
         (("--vocabulary", "none.spem"), "none.spem"),
         (("--power", "3"), "power=3"),
         (("--device", "cuda"), "cuda"),
+        (("--own-grid", "--voxels", "500"), "--own-grid and --voxels 500 exclude each other"),
     ],
 )
 def test_encode_refuses_bad_options(spem: Spem, folder: Path, options: tuple[str, str], word: str) -> None:
@@ -128,6 +133,25 @@ def test_encode_refuses_bad_options(spem: Spem, folder: Path, options: tuple[str
     result = spem("encode", folder, "-o", folder / "c.spem", *options)
     assert result.exit_code == 2
     assert word in result.stderr
+
+
+def test_paper_is_refused_beside_a_model(spem: Spem, folder: Path, codes: Path, tmp_path: Path) -> None:
+    """--paper cannot change the settings of codes that are there, nor of a vocabulary."""
+    for options in (("-o", codes), ("-o", tmp_path / "new.spem", "--vocabulary", codes)):
+        result = spem("encode", folder, *options, "--paper")
+        assert result.exit_code == 2
+        assert f"--paper: {codes} has settings of its own" in result.stderr
+
+
+def test_failures_told_are_those_of_the_run(spem: Spem, folder: Path, codes: Path) -> None:
+    """Adding files tells the failures of those files, in number and by name; the codes keep all."""
+    (folder / "old.npy").write_bytes(b"")
+    first = spem("encode", folder, "-o", codes, "--json")
+    assert [Path(each["path"]).name for each in json.loads(first.stdout)["failures"]] == ["old.npy"]
+    np.save(folder.parent / "extra.npy", ellipse(6, 12))
+    facts = json.loads(spem("encode", folder.parent / "extra.npy", "-o", codes, "--json").stdout)
+    assert (facts["n_failed"], facts["failures"], facts["n_shapes"]) == (0, [], 10)
+    assert [Path(each.path).name for each in Codes.load(codes).failures] == ["old.npy"]
 
 
 def test_search_ranks(spem: Spem, folder: Path, codes: Path) -> None:
@@ -195,6 +219,32 @@ def test_evaluate_scores(spem: Spem, folder: Path, codes: Path, tmp_path: Path) 
     page = (tmp_path / "report" / "report.html").read_text()
     assert "round0" in page
     assert "data:image/png" in page
+
+
+def test_report_shows_the_maps_of_the_codes(
+    spem: Spem, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The maps in a report are those of the first band, by the scheme and the centring of the settings."""
+    settings = Settings(
+        voxels=None,
+        rho_ranges=((0.05, 0.2), (0.2, 0.4)),
+        n_maps=5,
+        n_centers=4,
+        n_rho=9,
+        scheme="squared",
+        centred=True,
+    )
+    shown, codes = [], tmp_path / "c.spem"
+    encode_collection(find_files([folder / "*.npy"]), settings).save(codes)
+    monkeypatch.setattr("spem.cli.report.map_picture", shown.append)
+    result = spem("evaluate", codes, "--labels", folder / "labels.csv", "--report", tmp_path / "report")
+    assert result.exit_code == 0, result.stderr
+    assert len(shown) == 3
+    for maps in shown:
+        size = maps.shape.size
+        np.testing.assert_allclose(maps.rho, squared(0.05 * size, 0.2 * size, 9))
+        assert maps.values.shape[1] == 4
+        np.testing.assert_allclose(maps.values.mean(axis=0), 0, atol=1e-6)
 
 
 def test_evaluate_writes_json_to_stdout(spem: Spem, folder: Path, codes: Path) -> None:

@@ -43,6 +43,17 @@ def test_order_and_workers_change_nothing(folder: Path) -> None:
     np.testing.assert_array_equal(first.vectors, second.vectors[::-1])
 
 
+@pytest.mark.parametrize(("n_jobs", "threads"), [(1, None), (2, 1)])
+def test_several_processes_have_one_thread_each(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, n_jobs: int, threads: int | None
+) -> None:
+    """A sweep may take all cores only where it is alone."""
+    tasks, true = [], collection.run_all
+    monkeypatch.setattr(collection, "run_all", lambda task, *a: (tasks.append(task), true(task, *a))[1])
+    encode_collection(find_files([folder])[:2], SETTINGS, n_jobs=n_jobs)
+    assert [task.threads for task in tasks] == [threads]
+
+
 def test_file_by_itself_has_its_code_of_the_collection(folder: Path) -> None:
     """`encode_file` with the model of a collection gives the row of the collection."""
     codes = encode_collection(find_files([folder]), SETTINGS)
@@ -74,11 +85,11 @@ def test_unexpected_exception_is_one_failure(folder: Path, monkeypatch: pytest.M
     """An error that nobody foresaw costs one shape, and the reason names its type."""
     true, number = collection.sweep_bands, itertools.count()
 
-    def fragile(shape: Shape, settings: Settings) -> object:
+    def fragile(shape: Shape, settings: Settings, threads: int | None) -> object:
         if next(number) == 2:
             message = "two\nlines"
             raise ZeroDivisionError(message)
-        return true(shape, settings)
+        return true(shape, settings, threads)
 
     monkeypatch.setattr(collection, "sweep_bands", fragile)
     codes = encode_collection(find_files([folder]), SETTINGS)
@@ -119,12 +130,12 @@ def test_interrupted_call_goes_on(folder: Path, tmp_path: Path, monkeypatch: pyt
     whole = encode_collection(files, SETTINGS)
     true, calls = collection.sweep_bands, []
 
-    def counted(shape: Shape, settings: Settings) -> object:
+    def counted(shape: Shape, settings: Settings, threads: int | None) -> object:
         calls.append(shape.name)
         if len(calls) == 4:
             message = "stopped"
             raise KeyboardInterrupt(message)
-        return true(shape, settings)
+        return true(shape, settings, threads)
 
     monkeypatch.setattr(collection, "sweep_bands", counted)
     with pytest.raises(KeyboardInterrupt, match="stopped"):

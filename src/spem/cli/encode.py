@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from spem.codes.model import Model
     from spem.codes.settings import Settings
 
-# A process takes seconds to start, as long as it takes to code this many shapes.
-SHAPES_PER_PROCESS = 100
-
 
 def encode(
     paths: Annotated[
@@ -92,40 +89,36 @@ def encode(
     """  # noqa: D301
     check_device(device)
     check_target(output)
+    if own_grid and voxels is not None:
+        msg = f"--own-grid and --voxels {voxels} exclude each other; give one of them"
+        raise ParameterError(msg)
     if save_vocabulary is not None:
         check_target(save_vocabulary)
-    options: dict[str, Any] = {
-        "voxels": voxels,
-        "boundary": boundary and boundary.value,
-        "rho_ranges": _ranges(rho_range),
-        "n_rho": n_rho,
-        "scheme": rho_scheme and rho_scheme.value,
-        "n_maps": n_maps,
-        "n_centers": n_centers,
-        "power": power,
-        "scaling": scaling,
-        "moments": moments,
-        "drop_boundary": drop_boundary,
-        "threshold": threshold,
-        "dark": dark,
-        "components": components and components.value,
-        "seed": seed,
-    }
-    given = {key: value for key, value in options.items() if value is not None}
+    given = _given(
+        voxels=voxels,
+        boundary=boundary,
+        rho_ranges=_ranges(rho_range),
+        n_rho=n_rho,
+        scheme=rho_scheme,
+        n_maps=n_maps,
+        n_centers=n_centers,
+        power=power,
+        scaling=scaling,
+        moments=moments,
+        drop_boundary=drop_boundary,
+        threshold=threshold,
+        dark=dark,
+        components=components,
+        seed=seed,
+    )
     given |= {"voxels": None} if own_grid else {}
-    codes, n_failed = encode_paths(
+    codes, failures = encode_paths(
         paths, output, given, vocabulary=vocabulary, overwrite=overwrite, paper=paper, jobs=jobs
     )
     if save_vocabulary is not None:
         codes.model.save(save_vocabulary)
-    facts = {"output": output, "n_shapes": len(codes), "n_failed": n_failed, "model": codes.model.digest}
-    if json:
-        failures = [{"path": failure.path, "reason": failure.reason} for failure in codes.failures]
-        print_json(facts | {"failures": failures, "settings": codes.model.settings.to_json()})
-    else:
-        failed = f", {n_failed} failed" if n_failed else ""
-        typer.echo(f"wrote {output}: {len(codes)} shapes{failed}, model {codes.model.digest}")
-    if n_failed:
+    _tell(output, codes, failures, json=json)
+    if failures:
         raise typer.Exit(1)
 
 
@@ -138,7 +131,7 @@ def encode_paths(
     overwrite: bool = False,
     paper: bool = False,
     jobs: int | None = None,
-) -> tuple[Codes, int]:
+) -> tuple[Codes, tuple[Failure, ...]]:
     """Encode files into a codes file, or add them to it.
 
     Parameters
@@ -162,8 +155,8 @@ def encode_paths(
     -------
     codes
         What was written.
-    n_failed
-        Number of failures of this run.
+    failures
+        Of this run; the codes hold those of earlier ones too.
 
     Raises
     ------
@@ -176,7 +169,7 @@ def encode_paths(
     from spem.codes.collection import encode_collection, merge
     from spem.codes.sources import find_files
     from spem.codes.work import clear_work
-    from spem.fields.solvers.team import usable_threads
+    from spem.codes.workers import count_processes
 
     files = [path for path in find_files(paths) if path.absolute() != output.absolute()]
     known = Codes.load(output) if output.exists() and not overwrite else None
@@ -187,7 +180,6 @@ def encode_paths(
     model = known.model if known is not None else model
     settings = _settings(options, model, output if known is not None else vocabulary, paper=paper)
     work = output.with_name(output.name + ".work")
-    n_jobs = jobs or max(1, min(usable_threads(), len(files) // SHAPES_PER_PROCESS))
     with Bar() as bar:
         try:
             codes = encode_collection(
@@ -195,7 +187,7 @@ def encode_paths(
                 settings,
                 model=model,
                 known=known,
-                n_jobs=n_jobs,
+                n_jobs=jobs or count_processes(len(files)),
                 work=work,
                 progress=bar.advance,
                 on_failure=_report,
@@ -203,12 +195,12 @@ def encode_paths(
         except KeyboardInterrupt:
             msg = f"interrupted; what is done is kept in {work}: give the same command again to go on"
             raise KeyboardInterrupt(msg) from None
-    n_failed = len(codes.failures)
+    failures = codes.failures
     if known is not None:
         codes = merge(known, codes)
     codes.save(output)
     clear_work(work)
-    return codes, n_failed
+    return codes, failures
 
 
 def load_model(path: Path) -> Model:
@@ -239,12 +231,20 @@ def _settings(
 
     if model is None:
         return Settings.paper(**options) if paper else Settings(**options)
+    if paper:
+        msg = f"--paper: {source} has settings of its own; leave it out, or write another file"
+        raise ParameterError(msg)
     for key, value in options.items():
         fixed = getattr(model.settings, key)
         if value != fixed:
             msg = f"{key}={value}: {source} has {key}={fixed}; leave it out, or write another file"
             raise ParameterError(msg)
     return None
+
+
+def _given(**options: Any) -> dict[str, Any]:
+    """Return the options that were given, choices by the names that settings have for them."""
+    return {key: getattr(value, "value", value) for key, value in options.items() if value is not None}
 
 
 def _ranges(texts: list[str] | None) -> tuple[tuple[float, float], ...] | None:
@@ -267,6 +267,16 @@ def _ranges(texts: list[str] | None) -> tuple[tuple[float, float], ...] | None:
 
 def _report(failure: Failure) -> None:
     """Tell of a file that gave no code."""
-    said = failure.reason.startswith(failure.path)
-    complain(failure.reason if said else f"{failure.path}: {failure.reason}")
+    complain(str(failure))
     sys.stderr.flush()
+
+
+def _tell(output: Path, codes: Codes, failures: tuple[Failure, ...], *, json: bool) -> None:
+    """Tell what was written, and what failed in this run."""
+    if not json:
+        failed = f", {len(failures)} failed" if failures else ""
+        typer.echo(f"wrote {output}: {len(codes)} shapes{failed}, model {codes.model.digest}")
+        return
+    facts = {"output": output, "n_shapes": len(codes), "n_failed": len(failures)}
+    facts |= {"model": codes.model.digest, "settings": codes.model.settings.to_json()}
+    print_json(facts | {"failures": [{"path": each.path, "reason": each.reason} for each in failures]})

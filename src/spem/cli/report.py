@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from spem.codes.features import sweep_bands
+from spem.codes.features import band_maps, sweep_bands
 from spem.codes.sources import read_shapes, source_name
 from spem.codes.workers import run_all
-from spem.embedding.maps import compute_maps
 from spem.errors import SpemError
 from spem.plots.figures import map_picture
 from spem.plots.report import write_report
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
 THUMBNAIL_VOXELS = 4000
 # Maps are shown of the first shape of so many classes.
 MAP_PICTURES = 6
+SHOWN_MAPS = 4
 
 
 def write_collection_report(
@@ -93,14 +93,14 @@ def _thumbnails(codes: Codes, jobs: int) -> dict[tuple[str, str], bytes]:
 
 
 def _map_picture(codes: Codes, row: int) -> bytes | None:
-    """Draw the leading maps of one shape; None where its file is gone or cannot be drawn."""
+    """Draw the leading maps of one shape in its first band; None where its file is gone or undrawable."""
     source = Path(codes.paths[row])
-    settings = codes.model.settings
+    settings = replace(codes.model.settings, n_maps=min(SHOWN_MAPS, codes.model.settings.n_maps))
     try:
         for suffix, shape in read_shapes(source, settings):
             wanted = source_name(source) + suffix == codes.names[row]
             if wanted and not isinstance(shape, SpemError) and shape.ndim <= 3:
-                return map_picture(compute_maps(sweep_bands(shape, settings), min(4, settings.n_maps)))
+                return map_picture(band_maps(sweep_bands(shape, settings), settings))
     except SpemError:
         pass
     return None

@@ -102,7 +102,9 @@ def encode_collection(
         root = Path(work if work is not None else stack.enter_context(tempfile.TemporaryDirectory()))
         folder = Work.open(root, chosen, model)
         wanted = {key: source for key, source in listing.first.items() if key not in reused}
-        _compute(wanted, _Task(folder, chosen, model), n_jobs, listing, progress or (lambda *_: None))
+        # One process may take all cores for a large shape; of several each has one.
+        task = _Task(folder, chosen, model, threads=None if n_jobs == 1 else 1)
+        _compute(wanted, task, n_jobs, listing, progress or (lambda *_: None))
         fitted = model or _fit(folder, [key for key in wanted if key not in listing.broken], chosen, listing)
         return _assemble(listing, folder, reused, fitted, progress or (lambda *_: None))
 
@@ -185,13 +187,16 @@ class _Task:
     folder: Work
     settings: Settings
     model: Model | None
+    threads: int | None
 
     def __call__(self, item: tuple[str, Source]) -> None:
         key, source = item
-        self.folder.save(key, _entries(source, self.settings, self.model))
+        self.folder.save(key, _entries(source, self.settings, self.model, self.threads))
 
 
-def _entries(source: Source, settings: Settings, model: Model | None) -> list[Entry]:
+def _entries(
+    source: Source, settings: Settings, model: Model | None, threads: int | None = None
+) -> list[Entry]:
     """Compute the features of every shape of a source, or its code where there is a model."""
     entries = []
     for suffix, shape in read_shapes(source, settings):
@@ -199,7 +204,7 @@ def _entries(source: Source, settings: Settings, model: Model | None) -> list[En
             entries.append(Entry(suffix, one_line(shape)))
             continue
         try:
-            bands = node_features(sweep_bands(shape, settings), settings)
+            bands = node_features(sweep_bands(shape, settings, threads), settings)
         except SpemError as error:
             if not suffix:
                 raise

@@ -6,11 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spem.codes.bands import Bands
 from spem.codes.settings import Settings
-from spem.embedding.maps import compute_maps
+from spem.embedding.maps import Maps, compute_maps
 from spem.errors import ShapeError
 from spem.fields.domain import surface_domain
 from spem.fields.hyperfield import Hyperfield
@@ -23,7 +22,7 @@ from spem.shapes.shape import Shape
 _SWEEP_RTOL = 1e-6
 
 
-def sweep_bands(shape: Shape, settings: Settings) -> Hyperfield:
+def sweep_bands(shape: Shape, settings: Settings, threads: int | None = None) -> Hyperfield:
     """Sweep a shape over the ρ of all bands at once.
 
     Parameters
@@ -32,6 +31,8 @@ def sweep_bands(shape: Shape, settings: Settings) -> Hyperfield:
         The shape.
     settings
         Bands of ρ, in units of the shape's size, and the boundary.
+    threads
+        Threads for a large shape, as `Sweep` takes them; the outcome does not depend on it.
 
     Examples
     --------
@@ -43,7 +44,7 @@ def sweep_bands(shape: Shape, settings: Settings) -> Hyperfield:
         pick(bound) for pick, bound in zip((min, max), zip(*settings.rho_ranges, strict=True), strict=True)
     )
     rho = sample_rho(shape.size, low * shape.size, high * shape.size, max(settings.n_rho, 2), "log")
-    return Sweep(rtol=_SWEEP_RTOL).hyperfield(assemble(shape, settings.boundary), rho)
+    return Sweep(rtol=_SWEEP_RTOL, threads=threads).hyperfield(assemble(shape, settings.boundary), rho)
 
 
 def node_features(field: Hyperfield, settings: Settings) -> Bands:
@@ -74,13 +75,33 @@ def node_features(field: Hyperfield, settings: Settings) -> Bands:
     >>> [block.shape[1] for block in node_features(field, settings)]
     [4]
     """
-    size, keep = field.shape.size, _kept(field.shape, drop_boundary=settings.drop_boundary)
-    blocks: list[NDArray[Any]] = []
-    for low, high in settings.rho_ranges:
-        rho = sample_rho(size, low * size, high * size, settings.n_rho, settings.scheme)
-        maps = compute_maps(replace(field, rho=rho), settings.n_maps, centred=settings.centred)
-        blocks.append(np.ascontiguousarray(maps.values[keep], np.float32))
-    return tuple(blocks)
+    keep = _kept(field.shape, drop_boundary=settings.drop_boundary)
+    bands = range(len(settings.rho_ranges))
+    values = (band_maps(field, settings, band).values for band in bands)
+    return tuple(np.ascontiguousarray(block[keep], np.float32) for block in values)
+
+
+def band_maps(field: Hyperfield, settings: Settings, band: int = 0) -> Maps:
+    """Compute the maps of one band, on all nodes of the shape.
+
+    Parameters
+    ----------
+    field
+        Hyperfield of the shape over the ρ of all bands, as `sweep_bands` makes it.
+    settings
+        Bands, scheme, number of ρ and of maps.
+    band
+        Which range of ρ.
+
+    Examples
+    --------
+    >>> from spem.shapes.synthetic import disk
+    >>> band_maps(sweep_bands(disk(radius=10.0, spacing=1.0), Settings()), Settings()).rho.size
+    64
+    """
+    size, (low, high) = field.shape.size, settings.rho_ranges[band]
+    rho = sample_rho(size, low * size, high * size, settings.n_rho, settings.scheme)
+    return compute_maps(replace(field, rho=rho), settings.n_maps, centred=settings.centred)
 
 
 def _kept(shape: Shape, *, drop_boundary: bool) -> Any:

@@ -16,9 +16,12 @@ from threadpoolctl import threadpool_limits
 
 from spem.codes.arguments import whole_number
 from spem.errors import SpemError
+from spem.fields.solvers.team import usable_threads
 
 T = TypeVar("T")
 R = TypeVar("R")
+# A process takes seconds to start, as long as it takes to code this many shapes.
+_SHAPES_PER_PROCESS = 100
 # Seconds between two looks of a worker at its parent.
 _PARENT_CHECK = 0.5
 
@@ -39,8 +42,22 @@ def one_line(error: BaseException) -> str:
     )
 
 
+def count_processes(n_shapes: int) -> int:
+    """Return how many processes are worth their start for so many shapes.
+
+    Examples
+    --------
+    >>> count_processes(3)
+    1
+    """
+    return max(1, min(usable_threads(), n_shapes // _SHAPES_PER_PROCESS))
+
+
 def run_all(work: Callable[[T], R], tasks: Iterable[T], n_jobs: int = 1) -> Iterator[tuple[T, R | None, str]]:
-    """Run a function over tasks, each with one thread, and yield outcomes as they come.
+    """Run a function over tasks and yield outcomes as they come.
+
+    Each process has one thread. In this process numerical libraries have one, so that results do not
+    depend on how many there are; a solver's own threads, on which they do not depend, are left alone.
 
     Parameters
     ----------
