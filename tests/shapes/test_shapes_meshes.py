@@ -164,10 +164,10 @@ def test_grid_over_the_limit_is_refused_before_it_is_made(spacing: float) -> Non
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"voxels": 0}, "voxels=0: expected a positive number"),
+        ({"voxels": 0}, "voxels=0: expected a whole number of at least 1"),
         ({"spacing": -1.0}, "spacing=-1.0: expected one positive number, or 3"),
         ({"spacing": (1.0, 2.0)}, "expected one positive number, or 3"),
-        ({"inner_radius": float("nan")}, "inner_radius=nan: expected a positive"),
+        ({"inner_radius": float("nan")}, "inner_radius=nan: expected a number of at least 1"),
         ({"voxels": 100, "spacing": 1.0}, "given together"),
         ({"components": "most"}, "expected 'largest' or 'all'"),
     ],

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from spem.errors import ParameterError, ShapeError, SizeError
+from spem.shapes import synthetic
 from spem.shapes.distance import signed_distance
 from spem.shapes.images import read_image
 from spem.shapes.levels import level_shape
@@ -58,6 +59,35 @@ def test_inner_distances_are_met(distance):
     assert signed_distance(made).max() / made.spacing[0] == pytest.approx(distance, rel=0.015)
 
 
+@pytest.mark.parametrize("distance", [1, 1.5, 3, 10, 20])
+def test_the_deepest_place_is_a_node(distance):
+    """However few voxels there are, a node at the deepest place makes the distance what was asked."""
+    made = to_inner_distance(synthetic.disk(20, 1), distance)
+    assert signed_distance(made).max() / made.spacing[0] == pytest.approx(distance, rel=0.01)
+    assert np.array_equal(made.mask, made.mask[::-1, ::-1])
+    assert not any("instead of" in phrase for phrase in made.report.repairs)
+
+
+@pytest.mark.parametrize("distance", [0.8, 0.3, 1e-6, 0, -1, np.nan, "20", True])
+def test_inner_distances_under_a_voxel_are_refused(distance):
+    """They would say nothing of the shape, and led to grids of any size."""
+    with pytest.raises(ParameterError, match=r"inner_radius=.*: expected a number of at least 1, in voxels"):
+        to_inner_distance(synthetic.disk(20, 1), distance)
+
+
+def test_a_missed_budget_is_told():
+    """Rows of a square come and go together: the nearest grid is kept, and the report has its count."""
+    made = to_voxel_budget(Shape.from_mask(np.ones((9, 9))), 7)
+    assert made.report.repairs[-1] == f"{made.n_nodes} voxels instead of 7, the nearest that was found"
+
+
+@pytest.mark.parametrize("voxels", [np.nan, np.inf, 2.5, -3, "many", True])
+def test_budgets_are_whole_numbers(voxels):
+    """Anything else is refused in one line."""
+    with pytest.raises(ParameterError, match=r"voxels=.*: expected a whole number of at least 1"):
+        to_voxel_budget(Shape.from_mask(np.ones((9, 9))), voxels)
+
+
 def test_the_same_spacing_gives_the_same_shape():
     """Nothing is resampled for nothing."""
     shape = ball(5.0, 16, 2)
@@ -101,9 +131,9 @@ def test_arguments_out_of_range_are_refused():
     for spacing in (0.0, -1.0, np.nan, (1.0,), (1.0, 2.0, 3.0)):
         with pytest.raises(ParameterError, match="expected one positive number, or 2 of them"):
             to_spacing(shape, spacing)
-    with pytest.raises(ParameterError, match="voxels=0: expected a budget of at least 1"):
+    with pytest.raises(ParameterError, match="voxels=0: expected a whole number of at least 1"):
         to_voxel_budget(shape, 0)
-    with pytest.raises(ParameterError, match="inner distance inf: expected a positive number"):
+    with pytest.raises(ParameterError, match="inner_radius=inf: expected a number of at least 1"):
         to_inner_distance(shape, np.inf)
     with pytest.raises(SizeError, match=r"cells need .* the limit is 1 MiB"):
         to_spacing(shape, 0.01, memory_limit=1 << 20)

@@ -99,4 +99,4 @@ def inner_distance(distance: Any, name: str) -> float:
 
 def _number(value: Any) -> float:
     """Return a number as such, and NaN for anything else."""
-    return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    return math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -14,6 +13,8 @@ from numpy.typing import ArrayLike
 from spem.errors import ParameterError, ShapeError
 from spem.shapes.components import keep_components
 from spem.shapes.distance import signed_distance
+from spem.shapes.fit import fit_spacing
+from spem.shapes.grids import inner_distance, spacing_per_axis, voxel_count
 from spem.shapes.limits import DEFAULT_VOXELS, check_size
 from spem.shapes.mesh_files import load_mesh
 from spem.shapes.shape import Report, Shape
@@ -26,14 +27,13 @@ from spem.shapes.winding import fill_by_winding
 _BYTES_CLOSED, _BYTES_OPEN = 16, 96
 # A budget or inner radius is met within this fraction where whole voxels allow it.
 _TOLERANCE = 0.03
-_ROUNDS = 5
 
 
 def read_mesh(
     path: str | Path,
     *,
     voxels: int | None = None,
-    spacing: float | tuple[float, float, float] | None = None,
+    spacing: float | tuple[float, ...] | None = None,
     inner_radius: float | None = None,
     components: Literal["largest", "all"] = "largest",
     memory_limit: int | None = None,
@@ -95,7 +95,7 @@ def mesh_shape(
     faces: ArrayLike,
     *,
     voxels: int | None = None,
-    spacing: float | tuple[float, float, float] | None = None,
+    spacing: float | tuple[float, ...] | None = None,
     inner_radius: float | None = None,
     components: Literal["largest", "all"] = "largest",
     memory_limit: int | None = None,
@@ -119,7 +119,8 @@ def mesh_shape(
     spacing
         Distance between voxel centres, for all axes or one each, in the unit of the mesh.
     inner_radius
-        Distance from the deepest node to the surface, in voxels.
+        Distance from the deepest node to the surface, in voxels, at least 1. This or the number of nodes
+        is met within 3 % where whole voxels allow it, else the report says what it is.
     components
         "largest" keeps the largest connected component, "all" keeps all.
     memory_limit
@@ -157,10 +158,11 @@ def mesh_shape(
         raise ParameterError(msg)
     filler = _filler(vertices, faces, components, memory_limit, name, source)
     if spacing is not None:
-        return filler.at(_steps(spacing, name))
+        x, y, z = spacing_per_axis(spacing, 3, name)
+        return filler.at((x, y, z))
     if inner_radius is not None:
-        return _to_inner_radius(filler, _positive(inner_radius, "inner_radius", name))
-    return _to_budget(filler, _positive(DEFAULT_VOXELS if voxels is None else voxels, "voxels", name))
+        return _to_inner_radius(filler, inner_distance(inner_radius, name))
+    return _to_budget(filler, voxel_count(DEFAULT_VOXELS if voxels is None else voxels, name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,6 +174,10 @@ class _Filler:
     components: Literal["largest", "all"]
     memory_limit: int | None
     name: str
+
+    def isotropic(self, step: float) -> Shape:
+        """Fill with one spacing on all axes."""
+        return self.at((step, step, step))
 
     def at(self, steps: tuple[float, float, float]) -> Shape:
         """Fill on the grid of the given spacing that is centred on the bounding box."""
@@ -231,37 +237,30 @@ def _filler(
     return _Filler(surface, report, components, memory_limit, name)
 
 
-def _to_budget(filler: _Filler, voxels: float) -> Shape:
+def _to_budget(filler: _Filler, voxels: int) -> Shape:
     """Fill at the spacing that gives the number of nodes; overlaps and dropped parts take a few rounds."""
-    step = (filler.surface.volume / voxels) ** (1 / 3)
-    return _search(filler, step, lambda shape: (shape.n_nodes / voxels) ** (1 / 3), _TOLERANCE / 3)
+    return fit_spacing(
+        filler.isotropic,
+        (filler.surface.volume / voxels) ** (1 / 3),
+        lambda shape: shape.n_nodes,
+        voxels,
+        power=3,
+        tolerance=_TOLERANCE,
+        what="voxels",
+    )
 
 
 def _to_inner_radius(filler: _Filler, radius: float) -> Shape:
     """Fill at the spacing that puts the deepest node the given number of voxels from the surface."""
-    coarse = _to_budget(filler, DEFAULT_VOXELS)
-    step = float(signed_distance(coarse).max()) / radius
-
-    def ratio(shape: Shape) -> float:
-        return float(signed_distance(shape).max()) / (radius * shape.spacing[0])
-
-    return _search(filler, step, ratio, _TOLERANCE)
-
-
-def _search(filler: _Filler, step: float, ratio: Callable[[Shape], float], tolerance: float) -> Shape:
-    """Multiply the spacing by the ratio of found to wanted until it is one, and return the best shape."""
-    best = filler.at((step, step, step))
-    miss = math.log(ratio(best))
-    for _ in range(_ROUNDS):
-        if abs(miss) <= tolerance:
-            break
-        step = best.spacing[0] * math.exp(miss)
-        other = filler.at((step, step, step))
-        other_miss = math.log(ratio(other))
-        if abs(other_miss) >= abs(miss):
-            break
-        best, miss = other, other_miss
-    return best
+    return fit_spacing(
+        filler.isotropic,
+        float(signed_distance(_to_budget(filler, DEFAULT_VOXELS)).max()) / radius,
+        lambda shape: float(signed_distance(shape).max()) / shape.spacing[0],
+        radius,
+        power=1,
+        tolerance=_TOLERANCE,
+        what="voxels of inner distance",
+    )
 
 
 def _checked(vertices: ArrayLike, faces: ArrayLike, name: str) -> Surface:
@@ -283,21 +282,3 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, name: str) -> Surface:
     used = np.zeros(len(points), bool)
     used[triangles] = True
     return Surface(points[used], (np.cumsum(used) - 1)[triangles])
-
-
-def _steps(spacing: float | tuple[float, float, float], name: str) -> tuple[float, float, float]:
-    """Return one checked spacing per axis."""
-    steps = np.asarray(spacing, np.float64)
-    if steps.shape not in ((), (3,)) or not (np.isfinite(steps) & (steps > 0)).all():
-        msg = f"{name}: spacing={spacing}: expected one positive number, or 3 of them"
-        raise ParameterError(msg)
-    x, y, z = np.broadcast_to(steps, 3).tolist()
-    return x, y, z
-
-
-def _positive(value: float, what: str, name: str) -> float:
-    """Return a size, or say that it is not positive."""
-    if not (math.isfinite(value) and value > 0):
-        msg = f"{name}: {what}={value}: expected a positive number of voxels"
-        raise ParameterError(msg)
-    return float(value)

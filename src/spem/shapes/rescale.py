@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import ParameterError, ShapeError
+from spem.errors import ShapeError
 from spem.shapes.distance import signed_distance
+from spem.shapes.fit import fit_spacing
+from spem.shapes.grids import inner_distance, spacing_per_axis, voxel_count
 from spem.shapes.levels import level_shape
 from spem.shapes.limits import check_size
 from spem.shapes.shape import Shape
@@ -18,7 +20,8 @@ from spem.shapes.shape import Shape
 _BYTES_PER_VOXEL = 40
 # A voxel count or inner distance this close to what was asked is taken; grids step by whole voxels.
 _TOLERANCE = 0.01
-_ROUNDS = 6
+# Depths this close, relative to the largest, are the same but for rounding.
+_EQUAL = 1e-6
 # Volume counted in voxels varies by less than this from grid to grid, unless parts are lost.
 _VOLUME_CHANGE = 0.03
 
@@ -52,7 +55,7 @@ def to_spacing(shape: Shape, spacing: float | tuple[float, ...], *, memory_limit
     >>> to_spacing(Shape.from_mask(np.ones((8, 8))), 0.5)
     Shape('shape', 2-D, 252 nodes, grid 18 x 18, spacing 0.5 x 0.5)
     """
-    steps = _steps(shape, spacing)
+    steps = spacing_per_axis(spacing, shape.ndim, shape.name)
     if np.allclose(steps, shape.spacing, rtol=1e-12):
         return shape
     return _Resampler.of(shape, memory_limit).at(steps)
@@ -66,14 +69,15 @@ def to_voxel_budget(shape: Shape, voxels: int, *, memory_limit: int | None = Non
     shape
         The shape.
     voxels
-        Nodes wanted; met within about 1 % where whole voxels allow it.
+        Nodes wanted; met within 1 % where whole voxels allow it, else the report says how many
+        there are.
     memory_limit
         Bytes; None for SPEM_MEMORY_LIMIT or 2 GiB.
 
     Raises
     ------
     ParameterError
-        When the budget is under one voxel.
+        When the budget is no whole number of at least 1.
     ShapeError, SizeError
         As `to_spacing`.
 
@@ -82,39 +86,39 @@ def to_voxel_budget(shape: Shape, voxels: int, *, memory_limit: int | None = Non
     >>> to_voxel_budget(Shape.from_mask(np.ones((20, 20))), 10_000).n_nodes
     9988
     """
-    if voxels < 1:
-        msg = f"{shape.name}: voxels={voxels}: expected a budget of at least 1"
-        raise ParameterError(msg)
+    wanted = voxel_count(voxels, shape.name)
     resampler = _Resampler.of(shape, memory_limit)
-    step = (shape.volume / voxels) ** (1 / shape.ndim)
-    best = resampler.at((step,) * shape.ndim)
-    for _ in range(_ROUNDS):
-        if abs(best.n_nodes - voxels) <= _TOLERANCE * voxels:
-            break
-        step = best.spacing[0] * (best.n_nodes / voxels) ** (1 / shape.ndim)
-        other = resampler.at((step,) * shape.ndim)
-        if abs(other.n_nodes - voxels) >= abs(best.n_nodes - voxels):
-            break
-        best = other
-    return best
+    return fit_spacing(
+        resampler.isotropic,
+        (shape.volume / wanted) ** (1 / shape.ndim),
+        lambda made: made.n_nodes,
+        wanted,
+        power=shape.ndim,
+        tolerance=_TOLERANCE,
+        what="voxels",
+    )
 
 
 def to_inner_distance(shape: Shape, distance: float, *, memory_limit: int | None = None) -> Shape:
     """Resample a shape so that its deepest node lies this many voxels from the surface.
+
+    A node is put at the deepest place, and at the middle of the bounding box along every axis on
+    which the deepest place lies there.
 
     Parameters
     ----------
     shape
         The shape.
     distance
-        Largest distance from a node to the surface, in new voxels; the paper has 20.
+        Largest distance from a node to the surface, in new voxels, at least 1; the paper has 20. Met
+        within 1 % where whole voxels allow it, else the report says what it is.
     memory_limit
         Bytes; None for SPEM_MEMORY_LIMIT or 2 GiB.
 
     Raises
     ------
     ParameterError
-        When the distance is not positive and finite.
+        When the distance is not a number of at least 1.
     ShapeError, SizeError
         As `to_spacing`.
 
@@ -123,20 +127,18 @@ def to_inner_distance(shape: Shape, distance: float, *, memory_limit: int | None
     >>> to_inner_distance(Shape.from_mask(np.ones((9, 30))), 20)
     Shape('shape', 2-D, 5183 nodes, grid 41 x 135, spacing 0.225 x 0.225)
     """
-    if not (distance > 0 and math.isfinite(distance)):
-        msg = f"{shape.name}: inner distance {distance}: expected a positive number of voxels"
-        raise ParameterError(msg)
+    wanted = inner_distance(distance, shape.name)
     resampler = _Resampler.of(shape, memory_limit)
-    step = resampler.depth / distance
-    found = resampler.at((step,) * shape.ndim)
-    for _ in range(_ROUNDS):
-        # the nodes of the new grid may miss, or find, the deepest place
-        ratio = float(signed_distance(found).max()) / (step * distance)
-        if abs(ratio - 1) <= _TOLERANCE:
-            break
-        step *= ratio
-        found = resampler.at((step,) * shape.ndim)
-    return found
+    place = resampler.deepest
+    return fit_spacing(
+        lambda step: resampler.at((step,) * shape.ndim, place),
+        resampler.depth / wanted,
+        lambda made: float(signed_distance(made).max()) / made.spacing[0],
+        wanted,
+        power=1,
+        tolerance=_TOLERANCE,
+        what="voxels of inner distance",
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,19 +159,37 @@ class _Resampler:
         """Largest distance from a node to the surface."""
         return float(self.level.max())
 
-    def at(self, steps: tuple[float, ...]) -> Shape:
-        """Sample on a grid of the given spacing that is centred on the shape's bounding box."""
+    @property
+    def deepest(self) -> NDArray[np.float64]:
+        """``(d,)`` array index of the deepest node next to the middle of the grid, or of that middle."""
+        middle = (np.array(self.level.shape) - 1) / 2
+        index = np.argwhere(self.level >= self.depth * (1 - _EQUAL))
+        place = index[np.argmin(np.sum((index - middle) ** 2, axis=1))]
+        # a symmetric shape stays symmetric
+        return np.where(np.abs(place - middle) < 1, middle, place)
+
+    def isotropic(self, step: float) -> Shape:
+        """Sample with one spacing on all axes."""
+        return self.at((step,) * self.shape.ndim)
+
+    def at(self, steps: tuple[float, ...], node: NDArray[np.float64] | None = None) -> Shape:
+        """Sample on a grid of the given spacing: centred on the old one, or with a node at an index of it."""
         shape = self.shape
-        old = np.asarray(shape.spacing)
+        old, new = np.asarray(shape.spacing), np.asarray(steps)
         cells = np.asarray(shape.mask.shape) * old
-        # whole new cells over the old ones, centred on them: a symmetric shape stays symmetric, and
-        # halving the spacing halves the cells; one layer more on each side is outside for sure
-        counts = tuple(math.ceil(e / h - 1e-9) + 2 for e, h in zip(cells, steps, strict=True))
-        check_size(counts, _BYTES_PER_VOXEL, self.memory_limit, shape.name)
-        shift = (cells - old - (np.array(counts) - 1) * np.array(steps)) / 2
+        if node is None:
+            # whole new cells over the old ones, centred on them: a symmetric shape stays symmetric, and
+            # halving the spacing halves the cells; one layer more on each side is outside for sure
+            counts = np.ceil(cells / new - 1e-9) + 2
+            shift = (cells - old - (counts - 1) * new) / 2
+        else:
+            before = np.ceil((node + 0.5) * old / new) + 1
+            counts = before + np.ceil(cells / new - (node + 0.5) * old / new) + 2
+            shift = node * old - before * new
+        check_size(tuple(map(int, counts)), _BYTES_PER_VOXEL, self.memory_limit, shape.name)
         level = self.level
         for axis, h in enumerate(steps):
-            level = _interpolate(level, axis, (shift[axis] + np.arange(counts[axis]) * h) / old[axis])
+            level = _interpolate(level, axis, (shift[axis] + np.arange(int(counts[axis])) * h) / old[axis])
         if not (level > 0).any():
             msg = (
                 f"{shape.name}: thinner than the new grid, spacing {_text(steps)} leaves no node inside; "
@@ -191,17 +211,6 @@ def _interpolate(level: NDArray[np.float64], axis: int, place: NDArray[np.float6
     weight = (place - low).reshape([-1 if a == axis else 1 for a in range(level.ndim)])
     start = level.take(low, axis=axis)
     return np.asarray(start + weight * (level.take(np.minimum(low + 1, last), axis=axis) - start))
-
-
-def _steps(shape: Shape, spacing: float | tuple[float, ...]) -> tuple[float, ...]:
-    """Return one checked spacing per axis."""
-    steps = (
-        (float(spacing),) * shape.ndim if isinstance(spacing, (int, float)) else tuple(map(float, spacing))
-    )
-    if len(steps) != shape.ndim or not all(h > 0 and math.isfinite(h) for h in steps):
-        msg = f"{shape.name}: spacing={spacing}: expected one positive number, or {shape.ndim} of them"
-        raise ParameterError(msg)
-    return steps
 
 
 def _text(steps: tuple[float, ...]) -> str:
