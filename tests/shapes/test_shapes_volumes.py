@@ -83,7 +83,7 @@ def test_values_that_make_no_shape_are_refused():
         volume_shape(np.zeros((2, 2)))
     with pytest.raises(ShapeError, match=r"expected an array of numbers, got complex128 of shape \(2,\)"):
         volume_shape(np.zeros(2, complex))
-    with pytest.raises(ParameterError, match="expected one positive number, or 3 for the 3 axes"):
+    with pytest.raises(ParameterError, match="expected one positive number, or 3 of them"):
         volume_shape(BOX, (1, 2))
     with pytest.raises(SizeError, match=r"6 x 7 x 8 cells need .* the limit is 1 KiB"):
         volume_shape(BOX, memory_limit=1024)
@@ -117,6 +117,44 @@ def test_nifti_keeps_zooms_and_affine(tmp_path):
         assert shape.spacing == (0.5, 0.75, 2.0)
         assert np.allclose(shape.affine, affine)
         assert shape.n_nodes == BOX.sum()
+
+
+def test_a_slice_in_nifti_is_flat(tmp_path):
+    """Axes of length one are dropped, with their columns of the affine: places stay those of the scan."""
+    affine = np.array([[0, 0.5, 0.1, 3], [2, 0, 0, 4], [0, 0.2, 1, 5], [0, 0, 0, 1.0]])
+    image = nibabel.Nifti1Image(BOX[2:3, :, :, None].astype(np.uint8), affine)
+    nibabel.save(image, tmp_path / "slice.nii")
+    shape = read_volume(tmp_path / "slice.nii")
+    assert shape.n_nodes == BOX[2].sum()
+    assert shape.affine.shape == (4, shape.ndim + 1) == (4, 3)
+    assert np.allclose(shape.affine @ [3, 4, 1], affine @ [0, 3, 4, 1])
+    assert shape.spacing == pytest.approx(image.header.get_zooms()[1:3])
+
+
+def test_time_series_are_refused(tmp_path):
+    """As in TIFF, several times are no shape."""
+    series = np.repeat(BOX[..., None], 5, axis=3).astype(np.uint8)
+    nibabel.save(nibabel.Nifti1Image(series, np.eye(4)), tmp_path / "t.nii")
+    with pytest.raises(ReadError, match=r"t.nii: 6 x 7 x 8 x 5 values hold several times or channels"):
+        read_volume(tmp_path / "t.nii")
+
+
+def test_archives_of_other_things_are_refused(tmp_path):
+    """Fields and maps that spem wrote are no shapes; one array alone is, whatever its name."""
+    np.savez(tmp_path / "F.npz", points=np.ones((9, 2)), values=np.ones((9, 3)), rho=[1, 2, 3], spacing=1)
+    with pytest.raises(
+        ReadError, match=r"F.npz: no volume among its arrays points, values, rho, spacing; expected one named"
+    ):
+        read_volume(tmp_path / "F.npz")
+    np.savez(tmp_path / "lone.npz", anything=BOX, spacing=0.5)
+    assert read_volume(tmp_path / "lone.npz").n_nodes == BOX.sum()
+
+
+def test_text_called_npy_is_told_without_a_word_of_pickles(tmp_path):
+    """The message does not tell the user to load what cannot be trusted."""
+    (tmp_path / "a.npy").write_text("1 2 3")
+    with pytest.raises(ReadError, match=r"a.npy: damaged, truncated or not a .npy file \(it does not begin"):
+        read_volume(tmp_path / "a.npy")
 
 
 def test_tiff_stacks_are_read_with_their_spacing(tmp_path):
@@ -176,10 +214,12 @@ def test_files_that_are_no_volumes_are_refused_in_one_line(tmp_path):
     with pytest.raises(ReadError, match=r"a.npy: damaged, truncated"):
         read_volume(tmp_path / "a.npy")
     np.save(tmp_path / "p.npy", np.array([{}], object), allow_pickle=True)
-    with pytest.raises(ReadError, match=r"p.npy: damaged, truncated or not a .npy file"):
+    with pytest.raises(ReadError, match=r"p.npy: holds Python objects; expected an array of numbers"):
         read_volume(tmp_path / "p.npy")
     np.savez(tmp_path / "s.npz", spacing=np.ones(3))
-    with pytest.raises(ReadError, match="no volume among the arrays"):
+    with pytest.raises(
+        ReadError, match="no volume among its arrays spacing; expected one named mask, volume or labels"
+    ):
         read_volume(tmp_path / "s.npz")
 
 

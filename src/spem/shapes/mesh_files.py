@@ -10,8 +10,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from spem.errors import ReadError
+from spem.shapes.kinds import MESH_SUFFIXES
 
-MESH_SUFFIXES = (".obj", ".off", ".ply", ".stl", ".glb")
 # The counts of an OFF file stand among its first words, behind comments at most.
 _HEADER_LINES = 100
 

@@ -136,7 +136,8 @@ class Shape:
     report
         What was read and what was done to it.
     affine
-        ``(d + 1, d + 1)`` map from array index of the *source* to world coordinates, or None.
+        ``(w + 1, d + 1)`` map from array index of the *source* to the w world coordinates, or None; of a
+        slice of a scan, d = 2 and w = 3.
 
     Raises
     ------

@@ -6,15 +6,16 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import ParameterError, ReadError, SpemError
+from spem.errors import ReadError, SpemError
+from spem.shapes.grids import spacing_per_axis
+from spem.shapes.kinds import TIFF_SUFFIXES
 from spem.shapes.limits import check_file, check_size
 
-TIFF_SUFFIXES = (".tif", ".tiff")
 # Arrays of an .npz in the order in which they are looked for.
 _ARRAYS = ("mask", "volume", "labels")
 _UNIT_AXES = "CTS"
@@ -37,7 +38,7 @@ class Stack:
     source
         The file or call.
     affine
-        ``(d + 1, d + 1)`` map from index to world coordinates, or None.
+        ``(w + 1, d + 1)`` map from index to the w world coordinates, or None.
     notes
         What a report should say of the reading.
     """
@@ -58,24 +59,16 @@ class Stack:
         ParameterError
             When it is not one positive number for all or each axis.
         """
-        d = self.array.ndim
         if spacing is None:
             return self
-        steps = (
-            tuple(np.broadcast_to(np.asarray(spacing, float), (d,)).tolist())
-            if np.ndim(spacing) == 0
-            else (
-                tuple(float(h) for h in spacing)  # type: ignore[union-attr]
-            )
-        )
-        if len(steps) != d or not all(0 < h < np.inf for h in steps):
-            msg = f"{name}: spacing={spacing}: expected one positive number, or {d} for the {d} axes"
-            raise ParameterError(msg)
-        return replace(self, spacing=steps)
+        return replace(self, spacing=spacing_per_axis(spacing, self.array.ndim, name))
 
 
 def read_stack(path: Path, bytes_per_voxel: float, memory_limit: int | None) -> Stack:
     """Decode a volume file, after its header has been checked against the memory limit.
+
+    In files whose axes have names (TIFF, NIfTI), axes of length one are dropped, and several times
+    or channels are refused.
 
     Parameters
     ----------
@@ -156,21 +149,30 @@ def _decoder(path: Path) -> Callable[[Path, _Check], Stack]:
 
 
 def _npy(path: Path, check: _Check) -> Stack:
-    """Decode a NumPy array; mapped first, so that its header alone is read."""
-    check(np.load(path, mmap_mode="r", allow_pickle=False).shape)
+    """Decode a NumPy array, after its header."""
+    with path.open("rb") as file:
+        check(_array_shape(file, str(path)))
     array = np.load(path, allow_pickle=False)
     return Stack(array, (1.0,) * array.ndim, (0.0,) * array.ndim, path.stem, str(path))
 
 
 def _npz(path: Path, check: _Check) -> Stack:
     """Decode the volume of an archive of arrays, with its spacing and origin."""
+    if not zipfile.is_zipfile(path):
+        msg = f"{path}: damaged, truncated or not a .npz file (no archive of arrays); write it again"
+        raise ReadError(msg)
     with np.load(path, allow_pickle=False) as archive:
         names = [n for n in archive.files if n not in ("spacing", "origin")]
-        if not names:
-            msg = f"{path}: no volume among the arrays {archive.files}; expected one of {', '.join(_ARRAYS)}"
+        known = [n for n in _ARRAYS if n in names]
+        if not known and len(names) != 1:
+            msg = (
+                f"{path}: no volume among its arrays {', '.join(archive.files) or '(none)'}; "
+                f"expected one named {', '.join(_ARRAYS[:-1])} or {_ARRAYS[-1]}, or one array alone"
+            )
             raise ReadError(msg)
-        chosen = next((n for n in _ARRAYS if n in names), names[0])
-        check(_npz_shape(path, chosen))
+        chosen = (known or names)[0]
+        with zipfile.ZipFile(path) as members, members.open(f"{chosen}.npy") as member:
+            check(_array_shape(member, f"{path}, array {chosen!r}"))
         array = archive[chosen]
         d = array.ndim
         spacing = archive["spacing"] if "spacing" in archive.files else np.ones(d)
@@ -180,14 +182,19 @@ def _npz(path: Path, check: _Check) -> Stack:
     return stack.with_spacing(_per_axis(spacing, d, path, "spacing"), str(path))
 
 
-def _npz_shape(path: Path, name: str) -> tuple[int, ...]:
-    """Return the shape of an array in an archive from its header alone."""
-    with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as member:
-        version = np.lib.format.read_magic(member)
-        read = (
-            np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        )
-        return tuple(read(member)[0])
+def _array_shape(file: IO[bytes], what: str) -> tuple[int, ...]:
+    """Return the shape of a stored NumPy array from its header alone."""
+    magic = np.lib.format.MAGIC_PREFIX
+    start = file.read(len(magic) + 2)
+    if not start.startswith(magic):
+        msg = f"{what}: damaged, truncated or not a .npy file (it does not begin as one); write it again"
+        raise ReadError(msg)
+    read = np.lib.format.read_array_header_1_0 if start[-2] == 1 else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(file)
+    if dtype.hasobject:
+        msg = f"{what}: holds Python objects; expected an array of numbers, write one with numpy.save"
+        raise ReadError(msg)
+    return tuple(shape)
 
 
 def _per_axis(values: NDArray[Any], d: int, path: Path, what: str) -> tuple[float, ...]:
@@ -204,16 +211,20 @@ def _nifti(path: Path, check: _Check) -> Stack:
 
     image = nibabel.load(path)
     shape = tuple(image.shape)
-    d = len(shape)
-    while d > 1 and shape[d - 1] == 1:
-        d -= 1
     check(shape)
-    zooms = tuple(float(z) for z in image.header.get_zooms()[:d])
-    array = np.asanyarray(image.dataobj).reshape(shape[:d])
+    if any(n > 1 for n in shape[3:]):
+        times = " x ".join(map(str, shape))
+        msg = f"{path}: {times} values hold several times or channels; expected one, write it alone"
+        raise ReadError(msg)
+    kept = [axis for axis, n in enumerate(shape) if n > 1]
+    zooms = tuple(float(image.header.get_zooms()[axis]) for axis in kept)
+    array = np.asanyarray(image.dataobj).reshape([shape[axis] for axis in kept])
     name = path.name[: path.name.lower().index(".nii")]
-    affine = np.asarray(image.affine, np.float64) if d <= 3 else None
+    # the axes of length one lie at index 0, so that their columns say nothing
+    affine = np.asarray(image.affine, np.float64)[:, [*kept, 3]]
     known = all(0 < z < np.inf for z in zooms)
     note = "spacing from the header" if known else "no spacing in the header, 1 taken"
+    d = len(kept)
     return Stack(array, zooms if known else (1.0,) * d, (0.0,) * d, name, str(path), affine, (note,))
 
 
