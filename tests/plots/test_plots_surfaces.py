@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -227,3 +228,14 @@ def test_finer_grids_give_closer_surfaces() -> None:
         surface = shape_surface(ball(n, cuts=True))
         errors.append(np.abs(np.linalg.norm(surface.vertices, axis=1) - 1).mean())
     assert all(fine < 0.5 * coarse for coarse, fine in pairwise(errors))
+
+
+def test_section_has_the_very_colours_of_the_colour_map() -> None:
+    """On a plane that cuts a shape open, light and shade change no colour."""
+    shape = ball(25)
+    picture = picture_surface(
+        shape, np.full(shape.n_nodes, 0.3), view=(30, 40), cut=0, limits=(0, 1), size=(80, 80)
+    )
+    wanted = np.rint(255 * np.array(mpl.colormaps["viridis"](0.3))).astype(int)
+    same = (np.abs(picture.astype(int) - wanted) <= 1).all(axis=2)
+    assert same.mean() > 0.3

@@ -231,6 +231,7 @@ def _fill_surfaces(
             size=size,
             cmap=cmap,
             limits=ends,
+            unlit=surface.cut_faces,
         )
         ax.imshow(picture, interpolation="antialiased")
         bare(ax)

@@ -63,6 +63,7 @@ def render_surface(
     cmap: str = FIELD_CMAP,
     limits: tuple[float, float] | None = None,
     colour: str = SOLID,
+    unlit: ArrayLike | None = None,
 ) -> NDArray[np.uint8]:
     """Draw a triangle mesh, shaded by two soft lights, on a transparent ground.
 
@@ -85,6 +86,8 @@ def render_surface(
         Values at the two ends of the colour map; the smallest and largest value by default.
     colour
         Colour where there are no values.
+    unlit
+        ``(n_faces,)`` True where a face has the very colour of its values, without light or shade.
 
     Returns
     -------
@@ -122,6 +125,8 @@ def render_surface(
         level = (np.einsum("nk,nk->n", share, values[part]) - low) / max(high - low, 1e-300)
         rgb = mpl.colormaps[cmap](np.clip(level, 0, 1))[:, :3]
     light = _light(normal) - _crease(height, seen, max(fine))
+    if unlit is not None:
+        light[np.asarray(unlit, bool)[face[seen]]] = 1
     picture = np.zeros((fine[1], fine[0], 4))
     picture[seen, :3] = np.clip(rgb * light[:, None], 0, 1)
     picture[seen, 3] = 1

@@ -43,11 +43,20 @@ class Surface:
         ``(n_faces, 3)`` vertex numbers, counter-clockwise seen from outside.
     samples
         ``(n_vertices, 3)`` grid index, with fractions, where values are read.
+    section
+        ``(n_vertices,)`` True on the plane that cuts the shape open.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     samples: NDArray[np.float64]
+    section: NDArray[np.bool_]
+
+    @property
+    def cut_faces(self) -> NDArray[np.bool_]:
+        """``(n_faces,)`` True on the plane that cuts the shape open."""
+        flat: NDArray[np.bool_] = self.section[self.faces].all(axis=1)
+        return flat
 
 
 def shape_surface(shape: Shape, cut: int | None = None, *, toward: ArrayLike = (1.0, 1.0, 1.0)) -> Surface:
@@ -81,22 +90,21 @@ def shape_surface(shape: Shape, cut: int | None = None, *, toward: ArrayLike = (
         raise ShapeError(msg)
     level = surface_level(shape)
     first = np.zeros(3)
-    section = 0
+    plane = 0
     if cut is not None:
-        level, first, section = _open_level(shape, level, cut, float(np.asarray(toward)[cut]))
+        level, first, plane = _open_level(shape, level, cut, float(np.asarray(toward)[cut]))
     index, faces, _, _ = marching_cubes(level, 0.0, gradient_direction="ascent")
     index, faces = index.astype(np.float64) + first, faces.astype(np.int64)
+    section = np.zeros(len(index), bool)
     if cut is not None:
-        on_section = np.abs(index[:, cut] - section) < 1e-3
-        index[on_section, cut] = section
-        index, faces = _split_rim(index, faces, on_section)
+        section = np.abs(index[:, cut] - plane) < 1e-3
+        index[section, cut] = plane
+        index, faces, section = _split_rim(index, faces, section)
     spacing = np.asarray(shape.spacing)
     vertices = np.asarray(shape.origin) + index * spacing
     inward = -vertex_normals(vertices, faces) * min(shape.spacing) / spacing
-    samples = index + SAMPLE_DEPTH * inward
-    if cut is not None:
-        samples = np.where((index[:, cut] == section)[:, None], index, samples)
-    return Surface(vertices, faces, samples)
+    samples = np.where(section[:, None], index, index + SAMPLE_DEPTH * inward)
+    return Surface(vertices, faces, samples, section)
 
 
 def surface_values(shape: Shape, surface: Surface, values: ArrayLike) -> NDArray[np.float64]:
@@ -189,6 +197,7 @@ def picture_surface(
         size=size,
         cmap=MAP_CMAP if symmetric else FIELD_CMAP,
         limits=limits,
+        unlit=None if values is None else surface.cut_faces,
     )
 
 
@@ -238,10 +247,11 @@ def _open_level(
 
 def _split_rim(
     index: NDArray[np.float64], faces: NDArray[np.int64], on_section: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Give the section vertices of its own, so that its rim is a sharp edge."""
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Give the section vertices of its own, so that its rim is a sharp edge; tell which they are."""
     section = on_section[faces].all(axis=1)
     used, renumbered = np.unique(faces[section], return_inverse=True)
     faces = faces.copy()
     faces[section] = len(index) + renumbered.reshape(-1, 3)
-    return np.concatenate([index, index[used]]), faces
+    own = np.arange(len(index) + len(used)) >= len(index)
+    return np.concatenate([index, index[used]]), faces, own
