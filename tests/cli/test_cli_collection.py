@@ -20,6 +20,7 @@ from spem.codes.container import read_container, write_container
 from spem.codes.settings import Settings
 from spem.codes.sources import find_files
 from spem.fields.rho import squared
+from spem.retrieval.evaluation import MEASURES
 
 Spem = Callable[..., Result]
 Start = Callable[..., subprocess.Popen[str]]
@@ -215,9 +216,12 @@ def test_evaluate_scores(spem: Spem, folder: Path, codes: Path, tmp_path: Path) 
     assert {"NN", "FT", "ST", "E", "DCG", "n_shapes", "n_classes", "per_class"} <= set(facts)
     assert (facts["n_shapes"], facts["n_classes"]) == (9, 3)
     assert facts["NN"] > 80
+    assert 80 < facts["bulls_eye"] <= 100
     assert "9 shapes in 3 classes" in result.stdout
+    assert result.stdout.splitlines()[1].split() == [*MEASURES, "bull's", "eye"]
     page = (tmp_path / "report" / "report.html").read_text()
     assert "round0" in page
+    assert f"{facts['bulls_eye']:.1f}" in page
     assert "data:image/png" in page
 
 

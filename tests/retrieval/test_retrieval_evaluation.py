@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spem.errors import LabelError, ParameterError
-from spem.retrieval.evaluation import MEASURES, bulls_eye, evaluate, precision_recall
+from spem.retrieval.evaluation import MEASURES, average_precision, bulls_eye, evaluate, precision_recall
 
 LABELS = ["a", "a", "a", "b", "b", "c"]
 # Rankings, by hand:  0: 3 1 4 2 5 -> 0 1 0 1 0      3: 0 1 4 2 5 -> 0 0 1 0 0
@@ -30,7 +30,7 @@ def from_ranks(ranks: list[list[int]]) -> np.ndarray:
 def test_hand_computed_scores():
     """NN, FT, ST, E and DCG of six shapes agree with a calculation by hand."""
     scores = evaluate(from_ranks(RANKS), LABELS)
-    assert tuple(scores.per_query) == MEASURES
+    assert tuple(scores.per_query) == tuple(MEASURES)
     expected = {
         "NN": [0, 1, 0, 0, 1],
         "FT": [1 / 2, 1, 0, 0, 1],
@@ -47,6 +47,23 @@ def test_hand_computed_scores():
         assert scores.per_class()["b"][name] == pytest.approx(100 * np.mean(values[3:]))
     assert scores.skipped == (5,)
     assert list(scores.per_class()) == ["a", "b"]
+
+
+def test_hand_computed_average_precision():
+    """The mean of the precision at each relevant answer; nan where there is none to find."""
+    position = np.array([0.0, 1, 2, 10, 11, 12, 1.5, 30])
+    labels = ["a", "a", "a", "b", "b", "b", "b", "c"]
+    quality = average_precision(np.abs(position[:, None] - position), labels)
+    assert np.nanargmin(quality) == 6
+    assert quality[3] == pytest.approx((1 + 1 + 3 / 4) / 3)
+    assert np.flatnonzero(np.isnan(quality)).tolist() == [7]
+
+
+def test_scores_hold_the_bulls_eye():
+    """The scores of a collection have its bull's-eye score beside the measures of each query."""
+    distances = np.random.default_rng(3).random((9, 9))
+    labels = list("aaabbbbcd")
+    assert evaluate(distances, labels).bulls_eye == bulls_eye(distances, labels)
 
 
 def test_hand_computed_bulls_eye():

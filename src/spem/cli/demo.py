@@ -60,12 +60,14 @@ def _collection(shapes: Path, written: list[Path], *, quiet: bool) -> dict[str, 
     """Encode, search and score one folder of shapes, and draw the first of them."""
     from spem.cli.report import write_collection_report
     from spem.collections import row_keys
+    from spem.retrieval.distances import correlation_distance
     from spem.retrieval.labels import match_labels, read_labels
 
     root = shapes.parent
     codes, _ = encode_paths([str(shapes)], root / f"{shapes.name}.spem", {"voxels": VOXELS}, overwrite=True)
     classes = match_labels(row_keys(codes), read_labels(shapes / "labels.csv"))
-    scores = score(codes, classes)
+    distances = correlation_distance(codes.vectors, codes.vectors)
+    scores = score(distances, classes)
     if not quiet:
         typer.echo(f"\n{shapes}")
         print_scores(summary(scores))
@@ -74,7 +76,8 @@ def _collection(shapes: Path, written: list[Path], *, quiet: bool) -> dict[str, 
     _draw(Path(codes.paths[0]), *pictures)
     report = root / f"{shapes.name}-{REPORT}"
     title = f"Creatures, {shapes.name}"
-    written += [*pictures, write_collection_report(report, codes, classes, scores, title=title)]
+    page = write_collection_report(report, codes, classes, scores, distances=distances, title=title)
+    written += [*pictures, page]
     return summary(scores)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import secrets
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from spem.codes.files import write_whole
 from spem.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -85,15 +85,7 @@ def write_bytes(path: Path, content: bytes) -> None:
     ParameterError
         When it cannot be written.
     """
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
-    try:
-        temporary.write_bytes(content)
-        temporary.replace(path)
-    except OSError as error:
-        msg = f"{path}: cannot be written ({error.strerror}); give a file in a writable folder with room"
-        raise ParameterError(msg) from error
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_whole(path, lambda file: file.write(content))
 
 
 def write_npz(path: Path, **arrays: Any) -> None:

@@ -13,10 +13,12 @@ from spem.errors import SpemError
 from spem.plots.figures import map_picture
 from spem.plots.report import write_report
 from spem.plots.thumbnails import thumbnail
-from spem.retrieval.distances import correlation_distance
 from spem.retrieval.evaluation import precision_recall
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from spem.codes.codes import Codes
     from spem.codes.settings import Settings
     from spem.retrieval.evaluation import Scores
@@ -29,7 +31,14 @@ SHOWN_MAPS = 4
 
 
 def write_collection_report(
-    path: Path, codes: Codes, classes: list[str], scores: Scores, *, title: str, jobs: int = 1
+    path: Path,
+    codes: Codes,
+    classes: list[str],
+    scores: Scores,
+    *,
+    distances: NDArray[np.float64],
+    title: str,
+    jobs: int = 1,
 ) -> Path:
     """Write the report of a collection; files that are gone have no picture.
 
@@ -43,6 +52,8 @@ def write_collection_report(
         Class of each row.
     scores
         Scores of the collection.
+    distances
+        ``(n, n)`` distances between its shapes.
     title
         Heading of the page.
     jobs
@@ -53,7 +64,6 @@ def write_collection_report(
     pathlib.Path
         The file written.
     """
-    distances = correlation_distance(codes.vectors, codes.vectors)
     pictures = _thumbnails(codes, jobs)
     shown = [classes.index(label) for label in dict.fromkeys(classes)][:MAP_PICTURES]
     return write_report(

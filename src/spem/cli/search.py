@@ -19,7 +19,9 @@ from spem.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from spem.codes.codes import Codes
+    import numpy as np
+    from numpy.typing import NDArray
+
     from spem.retrieval.evaluation import Scores
 
 REPORT = "report.html"
@@ -71,7 +73,7 @@ def evaluate(
 ) -> None:
     """Score a collection whose labels are known.
 
-    NN, FT, ST, E and DCG in percent, each shape being a query in turn.
+    NN, FT, ST, E and DCG in percent, each shape being a query in turn, and the bull's-eye score.
 
     \b
     Examples:
@@ -84,7 +86,9 @@ def evaluate(
     if report is not None:
         check_folder(report)
     from spem.codes.codes import Codes
+    from spem.codes.workers import count_processes
     from spem.collections import row_keys
+    from spem.retrieval.distances import correlation_distance
     from spem.retrieval.labels import match_labels, read_labels, unused_labels
 
     collection, table = Codes.load(codes), read_labels(labels)
@@ -93,7 +97,8 @@ def evaluate(
     unused = unused_labels(keys, table)
     if unused:
         complain(f"{labels}: {len(unused)} labels are for files without a code, such as {unused[0]}")
-    scores = score(collection, classes)
+    distances = correlation_distance(collection.vectors, collection.vectors)
+    scores = score(distances, classes)
     facts = summary(scores)
     if json is not None and not to_stdout:
         write_bytes(json, (to_json(facts) + "\n").encode())
@@ -105,16 +110,22 @@ def evaluate(
         from spem.cli.report import write_collection_report
 
         page = write_collection_report(
-            report / REPORT, collection, classes, scores, title=codes.stem, jobs=jobs or 1
+            report / REPORT,
+            collection,
+            classes,
+            scores,
+            distances=distances,
+            title=codes.stem,
+            jobs=jobs or count_processes(len(collection)),
         )
         typer.echo(f"wrote {page}", err=to_stdout)
 
 
-def score(codes: Codes, classes: list[str]) -> Scores:
-    """Score codes against the class of each row, and tell of classes of one."""
-    from spem.collections import evaluate as score_codes
+def score(distances: NDArray[np.float64], classes: list[str]) -> Scores:
+    """Score the distances between shapes by the class of each, and tell of classes of one."""
+    from spem.retrieval.evaluation import evaluate as score_distances
 
-    scores = score_codes(codes, classes)
+    scores = score_distances(distances, classes)
     if scores.skipped:
         alone = ", ".join(classes[i] for i in scores.skipped[:3]) + (
             ", ..." if len(scores.skipped) > 3 else ""
@@ -127,6 +138,7 @@ def summary(scores: Scores) -> dict[str, Any]:
     """Return scores as the JSON of the command line has them."""
     return {
         **scores.mean(),
+        "bulls_eye": scores.bulls_eye,
         "n_shapes": len(scores.labels),
         "n_classes": len(set(scores.labels)),
         "n_skipped": len(scores.skipped),
@@ -135,7 +147,9 @@ def summary(scores: Scores) -> dict[str, Any]:
 
 
 def print_scores(facts: dict[str, Any]) -> None:
-    """Print the means of all measures."""
-    measures = ("NN", "FT", "ST", "E", "DCG")
+    """Print the means of all measures, and the bull's-eye score."""
+    from spem.retrieval.evaluation import MEASURES
+
+    columns = {name: name for name in MEASURES} | {"bulls_eye": "bull's eye"}
     typer.echo(f"{facts['n_shapes']} shapes in {facts['n_classes']} classes, percent")
-    print_table(measures, [tuple(f"{facts[name]:.1f}" for name in measures)])
+    print_table(tuple(columns.values()), [tuple(f"{facts[name]:.1f}" for name in columns)])

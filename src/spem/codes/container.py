@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import secrets
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +13,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import ModelError, ParameterError, ReadError
+from spem.codes.files import write_whole
+from spem.errors import ModelError, ReadError
 
 # Raised when the layout of the file changes: names of arrays, keys of the header, the hash.
 CONTAINER_FORMAT = 1
@@ -75,22 +75,10 @@ def write_container(
     ParameterError
         When the folder is not there or cannot be written.
     """
-    target = Path(path)
     envelope = {"kind": kind, "format": CONTAINER_FORMAT, "header": dict(header)}
     members = {**arrays, "header": np.frombuffer(_to_json(envelope), np.uint8)}
     members["sha256"] = np.frombuffer(bytes.fromhex(content_hash(envelope, arrays)), np.uint8)
-    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-    try:
-        with temporary.open("xb") as file:
-            _write_members(file, members)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(target)
-    except OSError as error:
-        msg = f"{target}: cannot be written ({error.strerror}); give a file in a writable folder with room"
-        raise ParameterError(msg) from error
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_whole(path, lambda file: _write_members(file, members))
 
 
 def read_container(path: str | os.PathLike[str], kind: str) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from spem.codes.files import write_whole
 from spem.errors import LabelError, ParameterError
 from spem.plots.markup import text
 from spem.plots.report_gallery import Gallery, shapes_section
@@ -50,7 +51,7 @@ def write_report(
     Parameters
     ----------
     path
-        File to write; an existing one is replaced.
+        File to write; an existing one is replaced at the end, in one step.
     title
         Heading of the page.
     names
@@ -78,7 +79,7 @@ def write_report(
     Raises
     ------
     ParameterError
-        If pictures, names and distances do not match in number.
+        If pictures, names and distances do not match in number, or the file cannot be written.
     LabelError
         If there is not one label for each shape.
 
@@ -106,7 +107,8 @@ def write_report(
     ]
     target = Path(path)
     # A file name that is not UTF-8 reaches here with surrogates, which no encoding takes.
-    target.write_bytes(_page(title, _summary(words, len(names)), "".join(body)).encode("utf-8", "replace"))
+    page = _page(title, _summary(words, len(names)), "".join(body)).encode("utf-8", "replace")
+    write_whole(target, lambda file: file.write(page))
     return target
 
 

@@ -8,19 +8,13 @@ from typing import TYPE_CHECKING
 from spem.plots.markup import data_uri, number, section, table, text
 from spem.plots.report_curve import curve_svg
 from spem.plots.report_gallery import Gallery
+from spem.retrieval.evaluation import MEASURES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from spem.retrieval.evaluation import PrecisionRecall, Scores
 
-MEASURES = {
-    "NN": "nearest neighbour",
-    "FT": "first tier",
-    "ST": "second tier",
-    "E": "E-measure",
-    "DCG": "discounted cumulative gain",
-}
 MAP_PICTURES = 24
 
 
@@ -34,10 +28,12 @@ def scores_section(scores: Scores | None, curve: PrecisionRecall | None) -> str:
     """
     cards = ""
     if scores is not None:
+        means = [(name, MEASURES.get(name, name), value) for name, value in scores.mean().items()]
+        means.append(("BE", "bull's eye", scores.bulls_eye))
         cards = "".join(
-            f'<div class="card"><dt><abbr title="{text(MEASURES.get(name, name))}">{text(name)}</abbr></dt>'
+            f'<div class="card"><dt><abbr title="{text(said)}">{text(name)}</abbr></dt>'
             f"<dd>{number(value)}<small> %</small></dd></div>"
-            for name, value in scores.mean().items()
+            for name, said, value in means
         )
         cards = f'<dl class="cards">{cards}</dl>\n'
     picture = "" if curve is None else f'<figure class="curve">{curve_svg(curve)}</figure>'

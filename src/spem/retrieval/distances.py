@@ -104,6 +104,29 @@ def fuse(*distances: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(np.sum([min_max(m) for m in matrices], axis=0))
 
 
+def rank_others(distances: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Rank all other shapes for each shape as a query, nearest first.
+
+    Parameters
+    ----------
+    distances
+        ``(n, n)`` distances, queries along the rows; the diagonal is not looked at.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(n, n - 1)`` indices; of equal distances the first index first.
+
+    Examples
+    --------
+    >>> rank_others(np.array([[0.0, 3.0, 1.0], [3.0, 0.0, 3.0], [1.0, 3.0, 0.0]])).tolist()
+    [[2, 1], [0, 2], [0, 1]]
+    """
+    n = len(distances)
+    order = np.argsort(distances, axis=1, kind="stable")
+    return np.asarray(order[order != np.arange(n)[:, None]].reshape(n, n - 1))
+
+
 def _standardised(vectors: ArrayLike, what: str) -> NDArray[np.float64]:
     """Return vectors centred and of unit length; constant ones become zero."""
     x = np.asarray(vectors, float)

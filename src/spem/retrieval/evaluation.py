@@ -21,8 +21,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import LabelError, ParameterError
+from spem.retrieval.distances import rank_others
 
-MEASURES = ("NN", "FT", "ST", "E", "DCG")
+MEASURES = {
+    "NN": "nearest neighbour",
+    "FT": "first tier",
+    "ST": "second tier",
+    "E": "E-measure",
+    "DCG": "discounted cumulative gain",
+}
 E_ANSWERS = 32
 
 
@@ -38,11 +45,14 @@ class Scores:
         ``(n,)`` class of each query.
     skipped
         Indices of the queries that are alone in their class.
+    bulls_eye
+        Bull's-eye score of the collection, in percent: see `bulls_eye`.
     """
 
     per_query: dict[str, NDArray[np.float64]]
     labels: tuple[Hashable, ...]
     skipped: tuple[int, ...]
+    bulls_eye: float
 
     def mean(self) -> dict[str, float]:
         """Return the means over all queries that are not skipped, in percent."""
@@ -96,7 +106,7 @@ def evaluate(distances: ArrayLike, labels: Sequence[Hashable]) -> Scores:
     Returns
     -------
     Scores
-        NN, FT, ST, E and DCG of every query.
+        NN, FT, ST, E and DCG of every query, and the bull's-eye score of all.
 
     Raises
     ------
@@ -126,7 +136,7 @@ def evaluate(distances: ArrayLike, labels: Sequence[Hashable]) -> Scores:
     }
     for values in scores.values():
         values[list(skipped)] = np.nan
-    return Scores(scores, tuple(labels), skipped)
+    return Scores(scores, tuple(labels), skipped, _bulls_eye(relevant, total, skipped))
 
 
 def bulls_eye(distances: ArrayLike, labels: Sequence[Hashable]) -> float:
@@ -146,11 +156,38 @@ def bulls_eye(distances: ArrayLike, labels: Sequence[Hashable]) -> float:
     >>> bulls_eye([[0, 1, 5], [1, 0, 4], [5, 4, 0]], ["cat", "cat", "dog"])
     100.0
     """
-    relevant, total, skipped = _relevance(distances, labels)
-    n, answers = relevant.shape
-    last = np.minimum(2 * (total + 1) - 1, answers)
-    score = (1 + relevant.cumsum(axis=1)[np.arange(n), last - 1]) / (total + 1)
-    return 100 * float(np.delete(score, list(skipped)).mean())
+    return _bulls_eye(*_relevance(distances, labels))
+
+
+def average_precision(distances: ArrayLike, labels: Sequence[Hashable]) -> NDArray[np.float64]:
+    """Return the average precision of each query: the mean of the precision at each relevant answer.
+
+    Parameters
+    ----------
+    distances
+        ``(n, n)`` distances, queries along the rows; the diagonal is not looked at.
+    labels
+        ``(n,)`` class of each shape.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(n,)`` in [0, 1]; nan for a query that is alone in its class.
+
+    Raises
+    ------
+    ParameterError, LabelError
+        As in `evaluate`.
+
+    Examples
+    --------
+    >>> average_precision([[0, 1, 2], [1, 0, 3], [2, 3, 0]], ["a", "b", "a"])
+    array([0.5, nan, 1. ])
+    """
+    relevant, total, _ = _relevance(distances, labels)
+    precision = relevant.cumsum(axis=1) / np.arange(1, relevant.shape[1] + 1)
+    average = (precision * relevant).sum(axis=1) / np.maximum(total, 1)
+    return np.asarray(np.where(total > 0, average, np.nan))
 
 
 def precision_recall(
@@ -195,6 +232,14 @@ def precision_recall(
     return PrecisionRecall(recall, np.delete(curves, list(skipped), axis=0).mean(axis=0), per_class, skipped)
 
 
+def _bulls_eye(relevant: NDArray[np.bool_], total: NDArray[np.int64], skipped: tuple[int, ...]) -> float:
+    """Return the mean share of each class among its first 2C answers, in percent."""
+    n, answers = relevant.shape
+    last = np.minimum(2 * (total + 1) - 1, answers)
+    score = (1 + relevant.cumsum(axis=1)[np.arange(n), last - 1]) / (total + 1)
+    return 100 * float(np.delete(score, list(skipped)).mean())
+
+
 def _relevance(
     distances: ArrayLike, labels: Sequence[Hashable]
 ) -> tuple[NDArray[np.bool_], NDArray[np.int64], tuple[int, ...]]:
@@ -204,7 +249,7 @@ def _relevance(
     if ranked.shape != (n, n):
         msg = f"distances of shape {ranked.shape} do not fit {n} labels; a square matrix of them was expected"
         raise ParameterError(msg)
-    np.fill_diagonal(ranked, np.inf)
+    np.fill_diagonal(ranked, 0.0)
     if np.isnan(ranked).any():
         msg = f"distances hold nan, first in row {np.flatnonzero(np.isnan(ranked).any(axis=1))[0]}"
         raise ParameterError(msg)
@@ -214,10 +259,7 @@ def _relevance(
     if not total.any():
         msg = f"none of the {len(number)} classes has two shapes, so no query has an answer; check the labels"
         raise LabelError(msg)
-    order = np.argsort(ranked, axis=1, kind="stable")
-    # The query itself goes wherever its infinite distance puts it, beside other infinite ones.
-    answers = order[order != np.arange(n)[:, None]].reshape(n, n - 1)
-    return code[answers] == code[:, None], total, tuple(np.flatnonzero(total == 0).tolist())
+    return code[rank_others(ranked)] == code[:, None], total, tuple(np.flatnonzero(total == 0).tolist())
 
 
 def _members(labels: Sequence[Hashable], skipped: tuple[int, ...]) -> dict[Hashable, NDArray[np.int64]]:
