@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from spem.errors import ReadError, ShapeError, SizeError
+from spem.errors import ParameterError, ReadError, ShapeError, SizeError
 from spem.shapes.images import image_shape, read_image
 
 BAR = np.zeros((12, 16), bool)
@@ -206,6 +206,17 @@ def test_a_huge_image_is_refused_by_its_header(tmp_path, monkeypatch):
     with pytest.raises(ReadError, match="damaged or truncated"):
         read_image(path, memory_limit=1 << 40)
     assert Image.MAX_IMAGE_PIXELS is not None
+
+
+def test_a_wrong_limit_is_no_damage(tmp_path, monkeypatch):
+    """What is wrong with the memory limit is said, not that the image is damaged."""
+    path = tmp_path / "bar.png"
+    Image.fromarray(np.eye(5, dtype=bool)).save(path)
+    with pytest.raises(ParameterError, match="memory_limit=-1: expected a positive number of bytes"):
+        read_image(path, memory_limit=-1)
+    monkeypatch.setenv("SPEM_MEMORY_LIMIT", "lots")
+    with pytest.raises(ParameterError, match="SPEM_MEMORY_LIMIT='lots': expected a positive size"):
+        read_image(path)
 
 
 def test_files_that_are_no_images_are_refused_in_one_line(tmp_path):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, UnidentifiedImageError
 
-from spem.errors import ReadError, ShapeError
+from spem.errors import ReadError, ShapeError, SpemError
 from spem.shapes.coverage import coverage_cuts, is_coverage
 from spem.shapes.levels import border_repairs, level_shape, otsu_level, refuse_non_finite
 from spem.shapes.limits import check_file, check_size
@@ -34,7 +34,8 @@ _DAMAGED = (
     struct.error,
     zlib.error,
 )
-# The limit of the decoder is a global; ours stands in for it while a file is opened.
+# The limit of the decoder is a global; ours stands in for it while a file is opened and, since TIFF and
+# others ask for it again there, while it is decoded.
 _DECODER = threading.Lock()
 
 
@@ -159,6 +160,8 @@ def _decode(path: Path, memory_limit: int | None) -> tuple[NDArray[Any], tuple[s
                     msg = f"{path}: a TIFF of {frames} pages is a volume; read it with read_volume"
                     raise ReadError(msg)
                 pixels = _channels(image)
+        except SpemError:
+            raise
         except UnidentifiedImageError as error:
             msg = f"{path}: not an image that can be decoded; the content does not fit any known format"
             raise ReadError(msg) from error
