@@ -11,7 +11,7 @@ from PIL import Image
 
 from spem.errors import ParameterError, ReadError, ShapeError
 from spem.shapes.distance import signed_distance
-from spem.shapes.read import MESH_SUFFIXES, read, read_all
+from spem.shapes.read import read, read_all
 from spem.shapes.shape import Shape
 
 BAR = np.zeros((12, 16), bool)
@@ -87,11 +87,51 @@ def test_meshes_come_as_files_objects_or_pairs(tmp_path):
         read(tmp_path / "cube.obj", label=1)
 
 
-def test_the_list_of_meshes_is_the_reader_s():
-    """Suffixes are the same here, where no library is loaded, and in the reader."""
-    from spem.shapes import mesh_files
+@pytest.mark.parametrize("side", ["negative", "positive"])
+def test_signed_distances_are_cut_at_zero(tmp_path, side):
+    """The zero level is the boundary, in arrays and files, whichever sign is inside."""
+    x = np.arange(60) - 29.3
+    radius = 10.42
+    distance = np.hypot(x[:, None], x) - radius
+    nodes = np.count_nonzero(distance < 0)
+    stored = distance if side == "negative" else -distance
+    np.save(tmp_path / "sd.npy", stored)
+    np.savez(tmp_path / "sd.npz", volume=stored, spacing=0.5)
+    tifffile.imwrite(tmp_path / "sd.tif", stored.astype(np.float32))
+    for source in (stored, stored.astype(np.float32), *(tmp_path / f"sd.{s}" for s in ("npy", "npz", "tif"))):
+        shape = read(source, signed_distance=side)
+        assert shape.n_nodes == nodes
+        assert shape.volume / np.prod(shape.spacing) == pytest.approx(np.pi * radius**2, rel=1e-3)
+        assert f"signed distance, {side} inside" in shape.report.method
+    assert "were these signed distances" in read(stored).report.method
 
-    assert mesh_files.MESH_SUFFIXES == MESH_SUFFIXES
+
+def test_signed_distances_go_with_nothing_else(bar_png):
+    """Other ways to tell inside from outside, wrong words and images are refused."""
+    level = np.linspace(-1, 1, 9)
+    with pytest.raises(
+        ParameterError, match=r"threshold=0.5 and signed_distance=negative exclude each other"
+    ):
+        read(level, threshold=0.5, signed_distance="negative")
+    with pytest.raises(
+        ParameterError, match="array: signed distance 'yes' inside: expected 'negative' or 'positive'"
+    ):
+        read(level, signed_distance="yes")
+    with pytest.raises(ShapeError, match=r"nowhere positive, so nothing is inside; .* say 'negative'"):
+        read(level - 2, signed_distance="positive")
+    with pytest.raises(ParameterError, match="signed_distance=negative does not apply to an image"):
+        read(bar_png, signed_distance="negative")
+    with pytest.raises(ParameterError, match="signed_distance=negative does not apply to a mesh"):
+        read(CUBE, signed_distance="negative")
+
+
+def test_components_of_a_shape_are_kept_when_asked():
+    """A shape comes with all its components, unless one way or the other is asked for."""
+    shape = Shape.from_mask(SPECKED)
+    assert read(shape, components="largest").n_nodes == BAR.sum()
+    assert read(shape, components="all").n_nodes == SPECKED.sum()
+    with pytest.raises(ParameterError, match="components='some'"):
+        read(shape, components="some")
 
 
 def test_shapes_come_back_or_resampled():
@@ -132,8 +172,13 @@ def test_what_cannot_be_read_is_refused(tmp_path, bar_png):
         ReadError, match=r"notes.txt: unknown kind of file .txt; expected one of .png, .*.npy.*.obj"
     ):
         read(tmp_path / "notes.txt")
-    with pytest.raises(ReadError, match=r"unknown kind of file \(no suffix\)"):
+    with pytest.raises(ReadError, match="nothing: cannot be opened"):
         read(tmp_path / "nothing")
+    with pytest.raises(ReadError, match="is a folder, expected a file"):
+        read(tmp_path)
+    for voxels in (np.nan, 2.5):
+        with pytest.raises(ParameterError, match=r"voxels=.*: expected a whole number of at least 1"):
+            read(bar_png, voxels=voxels)
     with pytest.raises(ReadError, match=r"absent.nii.gz: cannot be opened"):
         read(tmp_path / "absent.nii.gz")
     with pytest.raises(ParameterError, match=r"bar.PNG: label=1 does not apply to an image"):

@@ -48,19 +48,32 @@ def test_labels_are_picked_or_taken_together():
     assert together.report.method == "2 labels together: 3, 40"
     with pytest.raises(ShapeError, match=r"no label 7 in the volume; it has 0, 3, 40"):
         volume_shape(LABELS, label=7)
-    with pytest.raises(ParameterError, match=r"label=3 and level=1.0 exclude each other"):
-        volume_shape(LABELS, label=3, level=1.0)
+    with pytest.raises(ParameterError, match=r"label=3 and threshold=1.0 exclude each other"):
+        volume_shape(LABELS, label=3, threshold=1.0)
+
+
+@pytest.mark.parametrize("array", [np.array([[-1, 5], [7, 5]]), np.array([[0, 128], [255, 5]], np.uint8)])
+def test_labels_of_volumes_that_look_grey_are_picked(array):
+    """What is asked for is taken, negative numbers and eight bits notwithstanding."""
+    assert volume_shape(array, label=5).n_nodes == np.count_nonzero(array == 5)
+    with pytest.raises(ShapeError, match=r"no label 6 in the volume; it has "):
+        volume_shape(array, label=6)
+
+
+def test_labels_lie_among_negative_values_of_a_scan():
+    """Any value that is there can be chosen."""
+    assert volume_shape(np.array([[-1, 5], [7, 5]]), label=-1).n_nodes == 1
 
 
 def test_grey_levels_are_cut_between_voxels():
     """A grey volume is cut where its level is crossed, by Otsu's method or as given."""
-    shape = volume_shape(grey_ball(), level=100.0)
+    shape = volume_shape(grey_ball(), threshold=100.0)
     assert shape.volume == pytest.approx(4 / 3 * np.pi * 8.3**3, rel=0.03)
     assert len(shape.cuts) > 0
     assert np.ptp(shape.cuts.fraction) > 0.8
     assert "Otsu" in volume_shape(grey_ball()).report.method
-    with pytest.raises(ShapeError, match="level=200 leaves no voxel inside: the values run"):
-        volume_shape(grey_ball(), level=200)
+    with pytest.raises(ShapeError, match="threshold=200 leaves no voxel inside: the values run"):
+        volume_shape(grey_ball(), threshold=200)
 
 
 @pytest.mark.parametrize("dtype", [np.int16, np.uint8, np.float64])

@@ -14,17 +14,11 @@ from spem.codes.codes import file_hash
 from spem.codes.settings import Settings
 from spem.errors import ReadError, SpemError
 from spem.shapes.components import keep_components
-from spem.shapes.read import (
-    IMAGE_SUFFIXES,
-    MESH_SUFFIXES,
-    TIFF_SUFFIXES,
-    VOLUME_SUFFIXES,
-    read,
-)
+from spem.shapes.kinds import MESH_SUFFIXES, SUFFIXES, has_suffix, is_volume
+from spem.shapes.read import read
 from spem.shapes.shape import Shape
 
 Source: TypeAlias = Path | Shape
-_KINDS = (*IMAGE_SUFFIXES, *VOLUME_SUFFIXES, *MESH_SUFFIXES)
 
 
 def find_files(paths: Iterable[str | Path]) -> list[Path]:
@@ -62,7 +56,7 @@ def find_files(paths: Iterable[str | Path]) -> list[Path]:
         if path.is_dir():
             inside = _walk(path)
             if not inside:
-                msg = f"{path}: no shape in this folder; expected files of kind {', '.join(_KINDS)}"
+                msg = f"{path}: no shape in this folder; expected files of kind {', '.join(SUFFIXES)}"
                 raise ReadError(msg)
             found |= dict.fromkeys(inside)
         elif path.exists() or not glob.has_magic(str(given)):
@@ -157,23 +151,23 @@ def read_shapes(source: Source, settings: Settings) -> Iterator[tuple[str, Shape
     25
     """
     name = source_name(source)
-    if isinstance(source, Path) and settings.threshold is None and _is_volume(source):
+    if isinstance(source, Path) and settings.threshold is None and is_volume(source):
         from spem.shapes.volumes import read_labels
 
         for found in read_labels(source, name=name):
             yield found.name.removeprefix(name), _resampled(found, settings)
         return
     if isinstance(source, Shape):
-        yield "", read(source, voxels=settings.voxels)
+        yield "", read(source, voxels=settings.voxels, components=settings.components)
         return
-    grey = not _ends(source, MESH_SUFFIXES)
+    grey = not has_suffix(source, MESH_SUFFIXES)
     yield (
         "",
         read(
             source,
             voxels=settings.voxels,
             threshold=settings.threshold if grey else None,
-            dark=settings.dark if grey and not _is_volume(source) else None,
+            dark=settings.dark if grey and not is_volume(source) else None,
             components=settings.components,
             name=name,
         ),
@@ -188,21 +182,7 @@ def _resampled(shape: Shape, settings: Settings) -> Shape | SpemError:
         return error
 
 
-def _is_volume(path: Path) -> bool:
-    """Tell a volume from an image, which for a TIFF depends on its pages."""
-    if _ends(path, TIFF_SUFFIXES) and path.is_file():
-        from spem.shapes.stacks import tiff_pages
-
-        return tiff_pages(path) > 1
-    return _ends(path, VOLUME_SUFFIXES)
-
-
 def _walk(folder: Path) -> list[Path]:
     """List the files of a known kind below a folder, without hidden ones."""
-    inside = (path for path in folder.rglob("*") if path.is_file() and _ends(path, _KINDS))
+    inside = (path for path in folder.rglob("*") if path.is_file() and has_suffix(path, SUFFIXES))
     return sorted(p for p in inside if not any(part.startswith(".") for part in p.relative_to(folder).parts))
-
-
-def _ends(path: Path, suffixes: tuple[str, ...]) -> bool:
-    """Tell whether a file's name ends in one of the suffixes, in either case."""
-    return path.name.lower().endswith(suffixes)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import ParameterError, ShapeError
 from spem.shapes.shape import Cuts, Report, Shape
+
+# The sign that a signed distance has inside.
+Side: TypeAlias = Literal["negative", "positive"]
 
 
 def level_shape(
@@ -72,11 +75,13 @@ def signed_distance_shape(
     array: ArrayLike,
     spacing: float | tuple[float, ...] = 1.0,
     *,
-    inside: Literal["negative", "positive"] = "negative",
+    inside: Side = "negative",
     origin: tuple[float, ...] | None = None,
     name: str = "shape",
+    report: Report | None = None,
+    affine: NDArray[np.float64] | None = None,
 ) -> Shape:
-    """Make a shape from a signed distance to its surface.
+    """Make a shape from a signed distance to its surface, which is where it is zero.
 
     Parameters
     ----------
@@ -90,6 +95,10 @@ def signed_distance_shape(
         Coordinates of the centre of ``array[0, ..., 0]``; zeros by default.
     name
         Short name for messages and pictures.
+    report
+        What was done so far; padding is added to it.
+    affine
+        Kept with the shape.
 
     Raises
     ------
@@ -105,7 +114,7 @@ def signed_distance_shape(
     Shape('shape', 2-D, 21 nodes, grid 7 x 7, spacing 0.5 x 0.5)
     """
     if inside not in ("negative", "positive"):
-        msg = f"{name}: inside={inside!r}: expected 'negative' or 'positive'"
+        msg = f"{name}: signed distance {inside!r} inside: expected 'negative' or 'positive'"
         raise ParameterError(msg)
     values = np.asarray(array, dtype=np.float64)
     refuse_non_finite(values, name)
@@ -113,11 +122,12 @@ def signed_distance_shape(
     if not (level > 0).any():
         other = "positive" if inside == "negative" else "negative"
         msg = (
-            f"{name}: the signed distance is nowhere {inside}; if it is {other} inside, use inside={other!r}"
+            f"{name}: the signed distance is nowhere {inside}, so nothing is inside; "
+            f"if it is {other} inside, say {other!r}"
         )
         raise ShapeError(msg)
-    report = Report(method=f"signed distance, {inside} inside")
-    return level_shape(level, spacing, origin=origin, name=name, report=report)
+    report = report or Report(method=f"signed distance, {inside} inside")
+    return level_shape(level, spacing, origin=origin, name=name, report=report, affine=affine)
 
 
 def otsu_level(values: NDArray[Any]) -> float:

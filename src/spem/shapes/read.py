@@ -4,23 +4,46 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError, ReadError
 from spem.shapes.components import keep_components
+from spem.shapes.kinds import (
+    IMAGE_SUFFIXES,
+    MESH_SUFFIXES,
+    SUFFIXES,
+    TIFF_SUFFIXES,
+    has_suffix,
+    is_volume,
+)
+from spem.shapes.limits import check_file
 from spem.shapes.rescale import to_inner_distance, to_spacing, to_voxel_budget
 from spem.shapes.shape import Shape
 
-# Kept apart from the readers, whose libraries are loaded for the kind that is read only.
-IMAGE_SUFFIXES = (
-    ".png", ".gif", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm", ".pbm", ".pnm",
-)  # fmt: skip
-VOLUME_SUFFIXES = (".npy", ".npz", ".nii", ".nii.gz")
-TIFF_SUFFIXES = (".tif", ".tiff")
-MESH_SUFFIXES = (".obj", ".off", ".ply", ".stl", ".glb")
+if TYPE_CHECKING:
+    from spem.shapes.levels import Side
+
+
+class _OfImage(TypedDict):
+    """How inside is told from outside in an image."""
+
+    threshold: float | None
+    dark: bool | None
+
+
+class _OfVolume(TypedDict):
+    """How inside is told from outside in a volume."""
+
+    label: int | None
+    threshold: float | None
+    signed_distance: Side | None
+
+
+class _Values(_OfImage, _OfVolume):
+    """How inside is told from outside by values; nothing of it applies to a mesh or a shape."""
 
 
 class _Grid(TypedDict):
@@ -41,7 +64,8 @@ def read(
     label: int | None = None,
     threshold: float | None = None,
     dark: bool | None = None,
-    components: Literal["largest", "all"] = "largest",
+    signed_distance: Side | None = None,
+    components: Literal["largest", "all"] | None = None,
     memory_limit: int | None = None,
     name: str | None = None,
 ) -> Shape:
@@ -71,8 +95,10 @@ def read(
         Grey level of the surface, of images and grey volumes.
     dark
         Whether the shape is darker than the background, of images.
+    signed_distance
+        The array or volume holds signed distances to the surface, "negative" or "positive" inside.
     components
-        Keep the "largest" component or "all".
+        Keep the "largest" component or "all"; by default the largest, and all of a `Shape`.
     memory_limit
         Bytes; None for SPEM_MEMORY_LIMIT or 2 GiB.
     name
@@ -102,17 +128,27 @@ def read(
     array = not isinstance(source, (str, Path, Shape)) and not _is_mesh(source)
     _refuse_both(voxels, None if array else spacing, inner_radius)
     grid = _Grid(voxels=voxels, spacing=spacing, inner_radius=inner_radius, memory_limit=memory_limit)
+    values = _Values(label=label, threshold=threshold, dark=dark, signed_distance=signed_distance)
+    which = "largest" if components is None else components
+    source = Path(source) if isinstance(source, str) else source
+    if _is_mesh(source) or (isinstance(source, Path) and has_suffix(source, MESH_SUFFIXES)):
+        _refuse_unused(name or _title(source), "a mesh", **values)
+        return _mesh(source, grid, which, name)
     if isinstance(source, Shape):
-        _refuse_unused(source.name, "a shape", label=label, threshold=threshold, dark=dark)
-        return _regrid(source if name is None else replace(source, name=name), grid)
-    if _is_mesh(source) or _suffix(source) in MESH_SUFFIXES:
-        _refuse_unused(name or _title(source), "a mesh", label=label, threshold=threshold, dark=dark)
-        return _mesh(source, grid, components, name)
-    if array:
-        shape = _array(np.asarray(source), spacing, label, threshold, dark, memory_limit, name or "array")
+        _refuse_unused(source.name, "a shape", **values)
+        shape = source if name is None else replace(source, name=name)
+        if components is None:
+            return _regrid(shape, grid)
+    elif array:
+        shape = _array(np.asarray(source), spacing, values, memory_limit, name or "array")
         grid["spacing"] = None
     else:
-        shape = _file(Path(source), label, threshold, dark, memory_limit, name)
+        shape = _file(source, values, memory_limit, name)
+    return _keep(shape, which, grid)
+
+
+def _keep(shape: Shape, components: Literal["largest", "all"], grid: _Grid) -> Shape:
+    """Keep the components asked for, before and after resampling."""
     kept = keep_components(shape, components)
     regridded = _regrid(kept, grid)
     if regridded is kept or components == "all":
@@ -158,7 +194,7 @@ def read_all(
     _refuse_both(voxels, spacing, inner_radius)
     grid = _Grid(voxels=voxels, spacing=spacing, inner_radius=inner_radius, memory_limit=memory_limit)
     path = Path(path)
-    if not _is_volume(path):
+    if not is_volume(path):
         return [read(path, components=components, name=name, **grid)]
     from spem.shapes.volumes import read_labels
 
@@ -166,37 +202,29 @@ def read_all(
     return [_regrid(keep_components(shape, components), grid) for shape in shapes]
 
 
-def _file(
-    path: Path,
-    label: int | None,
-    threshold: float | None,
-    dark: bool | None,
-    memory_limit: int | None,
-    name: str | None,
-) -> Shape:
+def _file(path: Path, values: _Values, memory_limit: int | None, name: str | None) -> Shape:
     """Read an image or a volume."""
-    suffix = _suffix(path)
-    if suffix in VOLUME_SUFFIXES or (label is not None and suffix in TIFF_SUFFIXES) or _is_volume(path):
+    check_file(path)
+    # one page of a TIFF may hold labels or distances as well as grey levels
+    flat = values["label"] is not None or values["signed_distance"] is not None
+    if is_volume(path) or (flat and has_suffix(path, TIFF_SUFFIXES)):
         from spem.shapes.volumes import read_volume
 
-        _refuse_unused(str(path), "a volume", dark=dark)
-        return read_volume(path, label=label, level=threshold, memory_limit=memory_limit, name=name)
-    if suffix in IMAGE_SUFFIXES:
+        return read_volume(path, memory_limit=memory_limit, name=name, **_of_volume(values, str(path)))
+    if has_suffix(path, IMAGE_SUFFIXES):
         from spem.shapes.images import read_image
 
-        _refuse_unused(str(path), "an image", label=label)
-        return read_image(path, threshold=threshold, dark=dark, memory_limit=memory_limit, name=name)
-    kinds = ", ".join((*IMAGE_SUFFIXES, *VOLUME_SUFFIXES, *MESH_SUFFIXES))
-    msg = f"{path}: unknown kind of file {suffix or '(no suffix)'}; expected one of {kinds}"
+        chosen = _of_image(values, str(path))
+        return read_image(path, memory_limit=memory_limit, name=name, **chosen)
+    suffix = path.suffix.lower() or "(no suffix)"
+    msg = f"{path}: unknown kind of file {suffix}; expected one of {', '.join(SUFFIXES)}"
     raise ReadError(msg)
 
 
 def _array(
     array: NDArray[Any],
     spacing: float | tuple[float, ...] | None,
-    label: int | None,
-    threshold: float | None,
-    dark: bool | None,
+    values: _Values,
     memory_limit: int | None,
     name: str,
 ) -> Shape:
@@ -205,31 +233,25 @@ def _array(
     eight_bit = array.dtype == np.uint8 and array.size > 0
     colour = eight_bit and array.ndim == 3 and array.shape[2] in (3, 4)
     grey = eight_bit and array.ndim == 2 and array.max() == 255
-    if label is None and (colour or grey or dark is not None):
+    flat = values["label"] is None and values["signed_distance"] is None
+    if flat and (colour or grey or values["dark"] is not None):
         from spem.shapes.images import image_shape
 
-        return image_shape(
-            array, spacing=steps, threshold=threshold, dark=dark, memory_limit=memory_limit, name=name
-        )
+        chosen = _of_image(values, name)
+        return image_shape(array, spacing=steps, memory_limit=memory_limit, name=name, **chosen)
     from spem.shapes.volumes import volume_shape
 
-    _refuse_unused(name, "a label volume", dark=dark)
-    return volume_shape(array, steps, label=label, level=threshold, memory_limit=memory_limit, name=name)
+    return volume_shape(array, steps, memory_limit=memory_limit, name=name, **_of_volume(values, name))
 
 
 def _mesh(source: Any, grid: _Grid, components: Literal["largest", "all"], name: str | None) -> Shape:
     """Read and fill a mesh."""
     from spem.shapes.meshes import mesh_shape, read_mesh
 
-    if isinstance(source, (str, Path)):
-        return read_mesh(source, components=components, name=name, **_three(grid))
+    if isinstance(source, Path):
+        return read_mesh(source, components=components, name=name, **grid)
     vertices, faces = source if isinstance(source, tuple) else (source.vertices, source.faces)
-    return mesh_shape(vertices, faces, components=components, name=name or "mesh", **_three(grid))
-
-
-def _three(grid: _Grid) -> Any:
-    """Return the grid's arguments as the readers of meshes take them."""
-    return grid
+    return mesh_shape(vertices, faces, components=components, name=name or "mesh", **grid)
 
 
 def _regrid(shape: Shape, grid: _Grid) -> Shape:
@@ -251,21 +273,18 @@ def _is_mesh(source: Any) -> bool:
     return hasattr(source, "vertices") and hasattr(source, "faces")
 
 
-def _is_volume(path: Path) -> bool:
-    """Tell whether a file is a volume, which for a TIFF depends on its pages."""
-    if _suffix(path) in TIFF_SUFFIXES and path.is_file():
-        from spem.shapes.stacks import tiff_pages
-
-        return tiff_pages(path) > 1
-    return _suffix(path) in VOLUME_SUFFIXES
+def _of_image(values: _Values, name: str) -> _OfImage:
+    """Return what the reader of images takes, or say that the rest does not apply."""
+    _refuse_unused(name, "an image", label=values["label"], signed_distance=values["signed_distance"])
+    return _OfImage(threshold=values["threshold"], dark=values["dark"])
 
 
-def _suffix(source: Any) -> str:
-    """Return the suffix of a path in lower case, with the one before .gz; nothing for other sources."""
-    if not isinstance(source, (str, Path)):
-        return ""
-    suffixes = [s.lower() for s in Path(source).suffixes]
-    return "".join(suffixes[-2:] if suffixes[-1:] == [".gz"] else suffixes[-1:])
+def _of_volume(values: _Values, name: str) -> _OfVolume:
+    """Return what the reader of volumes takes, or say that the rest does not apply."""
+    _refuse_unused(name, "a volume", dark=values["dark"])
+    return _OfVolume(
+        label=values["label"], threshold=values["threshold"], signed_distance=values["signed_distance"]
+    )
 
 
 def _title(source: Any) -> str:

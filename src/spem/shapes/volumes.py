@@ -10,13 +10,20 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from spem.errors import ParameterError, ShapeError
-from spem.shapes.levels import border_repairs, level_shape, otsu_level, refuse_non_finite
+from spem.shapes.levels import (
+    Side,
+    border_repairs,
+    level_shape,
+    otsu_level,
+    refuse_non_finite,
+    signed_distance_shape,
+)
 from spem.shapes.limits import check_size
 from spem.shapes.shape import Report, Shape
 from spem.shapes.stacks import Stack, read_stack
 
-# The array, its level function as float64, masks: the most held for one voxel.
-_BYTES_PER_VOXEL = 20
+# The array, its level function as float64 twice, masks: the most held for one voxel.
+_BYTES_PER_VOXEL = 28
 # Up to this many whole values are labels whatever their pattern.
 _FEW_LABELS = 32
 _LISTED = 12
@@ -26,7 +33,8 @@ def read_volume(
     path: str | Path,
     *,
     label: int | None = None,
-    level: float | None = None,
+    threshold: float | None = None,
+    signed_distance: Side | None = None,
     spacing: float | tuple[float, ...] | None = None,
     memory_limit: int | None = None,
     name: str | None = None,
@@ -36,12 +44,14 @@ def read_volume(
     Parameters
     ----------
     path
-        The file. An .npz holds the volume as `mask`, `volume`, `labels` or its first array, and may
+        The file. An .npz holds the volume as `mask`, `volume`, `labels` or its only array, and may
         hold `spacing` and `origin`.
     label
         The label to take from a label volume; all that are not zero by default.
-    level
+    threshold
         The grey level of the surface; by Otsu's method by default.
+    signed_distance
+        The values are signed distances to the surface, which have this sign inside.
     spacing
         Distance between voxel centres; the file's own by default, or 1.
     memory_limit
@@ -68,7 +78,7 @@ def read_volume(
     """
     stack = read_stack(Path(path), _BYTES_PER_VOXEL, memory_limit)
     name = name or stack.name
-    return _shape(stack.with_spacing(spacing, name), label, level, name)
+    return _shape(stack.with_spacing(spacing, name), label, threshold, signed_distance, name)
 
 
 def read_labels(
@@ -106,7 +116,7 @@ def read_labels(
     refuse_non_finite(stack.array, name)
     kind, values = _kind(stack.array)
     if kind != "labels":
-        return [_shape(stack, None, None, name)]
+        return [_shape(stack, None, None, None, name)]
     found = values[values != 0]
     dense = np.searchsorted(found, stack.array) + 1
     dense[stack.array == 0] = 0
@@ -133,7 +143,8 @@ def volume_shape(
     spacing: float | tuple[float, ...] = 1.0,
     *,
     label: int | None = None,
-    level: float | None = None,
+    threshold: float | None = None,
+    signed_distance: Side | None = None,
     origin: tuple[float, ...] | None = None,
     memory_limit: int | None = None,
     name: str = "volume",
@@ -152,8 +163,10 @@ def volume_shape(
         One spacing for all axes, or one per axis.
     label
         The label to take; all that are not zero by default.
-    level
+    threshold
         The grey level of the surface; by Otsu's method by default.
+    signed_distance
+        The values are signed distances to the surface, which have this sign inside.
     origin
         Coordinates of the centre of ``array[0, ..., 0]``; zeros by default.
     memory_limit
@@ -166,7 +179,7 @@ def volume_shape(
     ShapeError
         When a value is NaN or infinite, the label is not there, or no voxel lies inside.
     ParameterError
-        When both a label and a level are given.
+        When more than one of label, threshold and signed distance is given.
 
     Examples
     --------
@@ -180,31 +193,47 @@ def volume_shape(
     check_size(values.shape, _BYTES_PER_VOXEL, memory_limit, name)
     start = (0.0,) * values.ndim if origin is None else tuple(map(float, origin))
     stack = Stack(values, (1.0,) * values.ndim, start, name, "array").with_spacing(spacing, name)
-    return _shape(stack, label, level, name)
+    return _shape(stack, label, threshold, signed_distance, name)
 
 
-def _shape(stack: Stack, label: int | None, level: float | None, name: str) -> Shape:
+def _shape(
+    stack: Stack, label: int | None, threshold: float | None, signed_distance: Side | None, name: str
+) -> Shape:
     """Make the shape that the array and the arguments ask for."""
     array = stack.array
-    if label is not None and level is not None:
-        msg = f"{name}: label={label} and level={level} exclude each other; give one"
+    asked = {"label": label, "threshold": threshold, "signed_distance": signed_distance}
+    given = [f"{key}={value}" for key, value in asked.items() if value is not None]
+    if len(given) > 1:
+        msg = f"{name}: {' and '.join(given)} exclude each other; give one"
         raise ParameterError(msg)
     refuse_non_finite(array, name)
-    if level is not None:
-        return _grey(stack, float(level), "given", name)
-    kind, values = _kind(array)
+    if signed_distance is not None:
+        return _signed(stack, signed_distance, name)
+    if threshold is not None:
+        return _grey(stack, float(threshold), "given", name)
     if label is not None:
-        if label not in values:
+        inside = array == label
+        if not inside.any():
             msg = f"{name}: no label {label} in the volume; it has {_listed(np.unique(array))}"
             raise ShapeError(msg)
-        return _mask(stack, array == label, f"label {label}", name)
+        return _mask(stack, inside, f"label {label}", name)
+    return _by_kind(stack, name)
+
+
+def _by_kind(stack: Stack, name: str) -> Shape:
+    """Make the shape that the values of the array suggest."""
+    array = stack.array
+    kind, values = _kind(array)
     if values.size == 1:
         if not values[0]:
             msg = f"{name}: all {array.size} values are zero, so no voxel lies inside"
             raise ShapeError(msg)
         return _mask(stack, np.ones(array.shape, bool), f"all values {values[0]:g}", name)
     if kind == "grey":
-        return _grey(stack, otsu_level(array), "Otsu", name)
+        how = "Otsu"
+        if array.dtype.kind == "f" and array.min() < 0 < array.max():
+            how = "Otsu; were these signed distances, signed_distance would put the surface at zero"
+        return _grey(stack, otsu_level(array), how, name)
     if kind == "mask":
         low, high = values
         inner = low if high == 0 else high
@@ -213,12 +242,25 @@ def _shape(stack: Stack, label: int | None, level: float | None, name: str) -> S
     return _mask(stack, array != 0, f"{count} labels together: {_listed(values[values != 0])}", name)
 
 
+def _signed(stack: Stack, side: Side, name: str) -> Shape:
+    """Make the shape whose surface is at zero."""
+    return signed_distance_shape(
+        stack.array,
+        stack.spacing,
+        inside=side,
+        origin=stack.origin,
+        name=name,
+        report=_report(stack, f"signed distance, {side} inside"),
+        affine=stack.affine,
+    )
+
+
 def _grey(stack: Stack, level: float, how: str, name: str) -> Shape:
     """Make the shape inside a grey level."""
     array = stack.array
     low, high = float(array.min()), float(array.max())
     if not level < high:
-        msg = f"{name}: level={level:g} leaves no voxel inside: the values run {low:g} to {high:g}"
+        msg = f"{name}: threshold={level:g} leaves no voxel inside: the values run {low:g} to {high:g}"
         raise ShapeError(msg)
     # single precision keeps every 16-bit grey level apart
     wide = array.dtype.itemsize > (4 if array.dtype.kind == "f" else 2)

@@ -1,0 +1,21 @@
+"""Where the shapes of a collection come from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from spem.codes.settings import Settings
+from spem.codes.sources import read_shapes
+from spem.shapes.shape import Shape
+
+
+@pytest.mark.parametrize(("components", "nodes"), [("largest", 12), ("all", 13)])
+def test_components_of_shapes_are_kept_as_the_settings_say(components, nodes):
+    """A shape made by hand is no exception."""
+    mask = np.zeros((5, 8), bool)
+    mask[:3, :4] = True
+    mask[4, 7] = True
+    settings = Settings(voxels=None, components=components)
+    [(_, shape)] = read_shapes(Shape.from_mask(mask), settings)
+    assert shape.n_nodes == nodes
