@@ -128,6 +128,22 @@ def test_saving_never_replaces_anything_else(tmp_path):
     assert file.read_text() == "years"
 
 
+@pytest.mark.parametrize("harm", ["delete", "shorten", "flip"])
+def test_damage_is_found(tmp_path, harm):
+    """A chunk that is lost, cut short or changed in one bit is no field."""
+    target = tmp_path / "f.zarr"
+    spem.sweep(Shape.from_mask(np.ones((9, 9))), rho=[1.0, 2.0]).save(target)
+    chunk = target / "basis" / "c" / "0" / "0"
+    data = bytearray(chunk.read_bytes())
+    data[len(data) // 2] ^= 1
+    if harm == "delete":
+        chunk.unlink()
+    else:
+        chunk.write_bytes(data[:-5] if harm == "shorten" else data)
+    with pytest.raises(ReadError, match="the hyperfield is damaged"):
+        Hyperfield.load(target)
+
+
 def test_reading_what_is_no_hyperfield(tmp_path):
     """A missing group and a foreign one get one clear line."""
     with pytest.raises(ReadError, match="no hyperfield there"):

@@ -137,12 +137,35 @@ def test_sweep_keeps_its_tolerance_on_hard_grids(counts, spacing, low, high):
     assert np.abs(solution.values - Direct().solve(system, rho).values).max() < 1e-6
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+def test_sweep_over_twelve_decades(rtol):
+    """Shifts far below and far above all eigenvalues take no poles from those between."""
+    shape = Shape.from_mask(np.ones((1, 90, 1)))
+    rho = np.r_[1e-3, np.geomspace(0.1, 1e9, 12), 1e100]
+    field = spem.sweep(shape, rho, boundary="voxel", rtol=rtol)
+    exact = Direct().solve(assemble(shape, "voxel"), rho).values
+    assert np.abs(field.fields() - exact).max() < rtol
+
+
+@pytest.mark.parametrize("fraction", [1e-6, 1e-3, 1.0])
+def test_edges_cut_short_cost_no_digits(fraction):
+    """A surface a millionth of an edge from the nodes leaves a field that is right to 1e-10."""
+    whole = Shape.from_mask(np.ones((20, 20)))
+    node, direction = np.nonzero(assemble(whole).domain.neighbours == whole.n_nodes)
+    cuts = Cuts(whole.voxels[node], direction.astype(np.uint8), np.full(node.size, fraction))
+    shape = Shape(whole.mask, whole.spacing, whole.origin, "square", cuts)
+    exact = Direct().solve(assemble(shape), np.array([5.0])).values[:, 0]
+    assert np.abs(spem.field(shape, 5.0) - exact).max() < 1e-10
+
+
 def test_a_useless_rho_or_tolerance_is_refused():
     """A ρ of a billionth of a voxel, or a tolerance of nothing, is named before any work."""
     with pytest.raises(ParameterError, match="hand: rho=1e-09 is below 1e-06 of the spacing 1"):
         spem.field(hand(), 1e-9)
     with pytest.raises(ParameterError, match="rtol=0: expected a tolerance between 0 and 1"):
         Sweep(rtol=0.0)
+    with pytest.raises(ParameterError, match="threads=0: expected at least one thread"):
+        Sweep(threads=0)
 
 
 def test_threads_and_slabs_change_nothing():

@@ -109,7 +109,7 @@ def compute_maps(field: Hyperfield, n_maps: int = 6, *, centred: bool = False) -
     upper = np.linalg.cholesky(field.gram).T
     small = upper @ field.coefficients()
     if centred:
-        small[0] = 0.0  # the other columns are orthogonal to the constant
+        small[0] = 0.0  # the part along the constant
     left, size, right = np.linalg.svd(small, full_matrices=False)
     size = np.pad(size, (0, max(0, n_maps - size.size)))
     left, basis = _complete(left, n_maps), _complete(right.T, n_maps)

@@ -33,11 +33,13 @@ class Hyperfield:
     rho
         ``(n_rho,)`` the sampled ρ, in the unit of the spacing.
     basis
-        ``(n_nodes, rank)`` orthonormal columns, orthogonal to the constant.
+        ``(n_nodes, rank)`` orthonormal columns.
     gram
         ``(rank + 1, rank + 1)`` inner products of the constant and the columns.
     mass, stiffness
-        ``(rank + 1, rank + 1)`` the matrices M and A of the system between them.
+        ``(rank, rank)`` the matrices M and A of the system between the columns.
+    source
+        ``(rank,)`` M·1 against the columns.
     boundary
         Boundary model, ``"surface"`` or ``"voxel"``.
     error
@@ -59,6 +61,7 @@ class Hyperfield:
     gram: NDArray[np.float64]
     mass: NDArray[np.float64]
     stiffness: NDArray[np.float64]
+    source: NDArray[np.float64]
     boundary: str = "surface"
     error: float = 0.0
 
@@ -73,7 +76,7 @@ class Hyperfield:
         a = np.zeros((self.rank + 1, wanted.size))
         a[0] = 1.0
         finite = np.isfinite(wanted)
-        a[:, finite] -= galerkin(self.stiffness, self.mass, wanted[finite] ** -2.0)
+        a[1:, finite] = -galerkin(self.stiffness, self.mass, self.source, wanted[finite] ** -2.0)
         return a
 
     def resampled(self, rho: ArrayLike) -> Hyperfield:
@@ -158,8 +161,11 @@ class Hyperfield:
 
 
 def galerkin(
-    stiffness: NDArray[np.float64], mass: NDArray[np.float64], shifts: NDArray[np.float64]
+    stiffness: NDArray[np.float64],
+    mass: NDArray[np.float64],
+    source: NDArray[np.float64],
+    shifts: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Solve (A + s M) y = s M e, e the constant, for each s: deficits 1 - v in a basis, one column each."""
+    """Solve (A + s M) y = s M·1 in a basis for each s: the coefficients of 1 - v, one column each."""
     s = shifts[:, None, None]
-    return np.asarray(np.linalg.solve(stiffness + s * mass, s * mass[:, :1])[..., 0].T)
+    return np.asarray(np.linalg.solve(stiffness + s * mass, s * source[:, None])[..., 0].T)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 from dataclasses import asdict
 from pathlib import Path
@@ -59,6 +60,7 @@ def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
         "gram": field.gram,
         "mass": field.mass,
         "stiffness": field.stiffness,
+        "source": field.source,
         "rho": field.rho,
         "voxels": shape.voxels,
         "cut_voxel": cuts.voxel,
@@ -81,6 +83,7 @@ def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
             "boundary": field.boundary,
             "error": field.error,
             "report": asdict(shape.report),
+            "sha256": _digest(arrays),
         }
     )
     if target.exists():
@@ -111,10 +114,23 @@ def load_hyperfield(path: str | Path) -> Hyperfield:
         raise ReadError(msg)
     try:
         arrays = {name: np.asarray(array[...]) for name, array in group.arrays()}
-        return _assemble(attributes, arrays)
-    except (KeyError, TypeError, ValueError, IndexError) as error:
-        msg = f"{path}: the hyperfield is damaged ({error}); write it again"
-        raise ReadError(msg) from error
+        if _digest(arrays) == attributes["sha256"]:
+            return _assemble(attributes, arrays)
+        reason = "its numbers are not those that were written"
+    except (KeyError, TypeError, ValueError, IndexError, RuntimeError, OSError) as error:
+        reason = str(error)
+    msg = f"{path}: the hyperfield is damaged ({reason}); write it again"
+    raise ReadError(msg)
+
+
+def _digest(arrays: dict[str, NDArray[Any]]) -> str:
+    """SHA-256 of names, types, shapes and bytes."""
+    total = hashlib.sha256()
+    for name in sorted(arrays):
+        values = np.ascontiguousarray(arrays[name])
+        total.update(f"{name} {values.dtype.str} {values.shape}".encode())
+        total.update(values.tobytes())
+    return total.hexdigest()
 
 
 def _assemble(attributes: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Hyperfield:
@@ -138,6 +154,7 @@ def _assemble(attributes: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Hy
         arrays["gram"],
         arrays["mass"],
         arrays["stiffness"],
+        arrays["source"],
         attributes["boundary"],
         attributes["error"],
     )

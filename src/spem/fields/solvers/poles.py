@@ -50,25 +50,33 @@ class Targets:
         t = _LOWEST_POLE + (1 - _LOWEST_POLE) * (t / t[0] + 1) / 2
         return np.asarray(low * (high / low) ** t)
 
-    def dense(self, floor: float = 0.0) -> Small:
-        """Shifts that stand for all that count, geometric in s + `floor` if they are a range."""
+    def dense(self, lowest: float = 0.0, highest: float = np.inf) -> Small:
+        """Shifts that stand for all that count, spread by `_spread` if they are a range."""
         if self.few is not None or not self.shifts.size:
             return np.unique(self.shifts)
-        low, high = self.shifts.min(), self.shifts.max()
-        return np.clip(np.geomspace(low + floor, high + floor, _DENSE) - floor, low, high)
+        ends = np.array([self.shifts.min(), self.shifts.max()])
+        low, high = _spread(ends, lowest, highest)
+        grid = np.geomspace(low, high, _DENSE)
+        return np.asarray(np.clip((grid - lowest) / (1 - grid / highest), *ends))
 
-    def next(self, poles: Small, floor: float) -> Small:
-        """Eight more shifts s, where the interpolant's ∏|s - p|/(s + p + 2λ) is largest in turn (Leja).
+    def next(self, poles: Small, lowest: float, highest: float) -> Small:
+        """Eight more shifts, where the rational interpolant's ∏|σ - σₚ|/(σ + σₚ) is largest in turn (Leja).
 
-        λ, the `floor`, is the lowest eigenvalue of the operator: fields change little with shifts far below
-        it. The largest shift, where fields vary fastest, is always among the eight: what single precision
-        left of its error shows nowhere else.
+        `lowest` and `highest` bound the eigenvalues that count. The largest shift, where fields vary fastest,
+        is always among the eight: what single precision left of its error shows nowhere else.
         """
         if self.few is not None:
             return self.few
-        candidates, chosen = self.dense(floor), list(poles)
+        candidates, chosen = self.dense(lowest, highest), list(poles)
+        spread = _spread(candidates, lowest, highest)
         for _ in range(LANES - 1):
-            distance = np.abs(np.subtract.outer(candidates, chosen))
-            ratio = distance / (np.add.outer(candidates, chosen) + 2 * floor) + np.finfo(float).tiny
+            taken = _spread(np.array(chosen), lowest, highest)
+            distance = np.abs(np.subtract.outer(spread, taken))
+            ratio = distance / np.add.outer(spread, taken) + np.finfo(float).tiny
             chosen.append(candidates[int(np.argmax(np.log(ratio).sum(axis=1)))])
         return np.array([*chosen[1 - LANES :], candidates[-1]])
+
+
+def _spread(shifts: Small, lowest: float, highest: float) -> Small:
+    """σ = (s + λ₁)/(1 + s/λₙ): fields change little with shifts far below or above all eigenvalues."""
+    return (shifts + lowest) / (1 + shifts / highest)

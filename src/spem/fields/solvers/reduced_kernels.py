@@ -1,7 +1,6 @@
 """Numba kernels of the reduced basis, in double precision whatever the basis is stored in.
 
-A block is an ``(n + 1, LANES)`` array of columns with a last row of zeros; the constant is never stored.
-Slabs are those of `kernels`.
+A block is an ``(n + 1, LANES)`` array of columns with a last row of zeros. Slabs are those of `kernels`.
 """
 
 from __future__ import annotations
@@ -20,13 +19,11 @@ Slabs = NDArray[np.int64]
 
 
 @njit(cache=True, nogil=True)
-def combine(
-    block: Block, mix: Small, constant: Small, out: Block, keep: bool, slabs: Slabs, first: int, stride: int
-) -> None:
-    """Write ``constant + block @ mix`` to `out`, or add ``block @ mix`` to it where `keep` is True."""
+def combine(block: Block, mix: Small, out: Block, keep: bool, slabs: Slabs, first: int, stride: int) -> None:
+    """Write ``block @ mix`` to `out`, or add it where `keep` is True."""
     for slab in range(first, slabs.size - 1, stride):
         for i in range(slabs[slab], slabs[slab + 1]):
-            value = load_wide(out, i) if keep else load(constant, 0)
+            value = load_wide(out, i) if keep else splat(0.0)
             for k in range(LANES):
                 value = add(value, mul(splat(np.float64(block[i, k])), load(mix, k)))
             store(out, i, value)
@@ -58,7 +55,7 @@ def cross_operator(
     first: int,
     stride: int,
 ) -> None:
-    """Write ``block.T @ A @ other`` and ``block.T @ M @ other`` to a slab's part, each with column sums."""
+    """Write ``block.T @ A @ other``, ``block.T @ M @ other`` and the column sums of the latter's factor."""
     for slab in range(first, slabs.size - 1, stride):
         stiff, heavy = partial[slab, 0], partial[slab, 1]
         stiff[:] = 0
@@ -73,7 +70,6 @@ def cross_operator(
                 factor = splat(np.float64(block[i, k]))
                 store(stiff, k, add(load(stiff, k), mul(factor, value)))
                 store(heavy, k, add(load(heavy, k), mul(factor, here)))
-            store(stiff, LANES, add(load(stiff, LANES), value))
             store(heavy, LANES, add(load(heavy, LANES), here))
 
 

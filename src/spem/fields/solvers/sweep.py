@@ -39,6 +39,8 @@ _DROPPED = 1e-2
 
 # In units of the spacing; single precision holds the square of its inverse.
 _LEAST_RHO = 1e-6
+# Of the lowest eigenvalue: the deficit at such a shift is far below the tolerance everywhere.
+_NEGLIGIBLE = 1e-3
 # Rounding, not the operator, gives lower eigenvalues than this.
 _LOWEST_TRUSTED = 1e-3
 Small = NDArray[np.float64]
@@ -77,6 +79,9 @@ class Sweep:
     threads: int | None = None
 
     def __post_init__(self) -> None:
+        if self.threads is not None and self.threads < 1:
+            msg = f"threads={self.threads}: expected at least one thread"
+            raise ParameterError(msg)
         if not 0 < self.rtol < 1:
             msg = f"rtol={self.rtol:g}: expected a tolerance between 0 and 1"
             raise ParameterError(msg)
@@ -115,19 +120,22 @@ class Sweep:
         hierarchy = Hierarchy.of(system)
         dtype = np.float32 if self.rtol > _SINGLE_STORAGE else np.float64
         basis = ReducedBasis(system, hierarchy.unit, dtype, hierarchy.levels[0].slabs, team)
-        targets = Targets(np.square(hierarchy.unit / rho[np.isfinite(rho)]), between)
+        shifts = np.square(hierarchy.unit / rho[np.isfinite(rho)])
+        # Below this shift fields are one to within the tolerance; their deficits are proportional to it.
+        targets = Targets(np.maximum(shifts, _NEGLIGIBLE * self.rtol * _box_eigenvalue(system)), between)
         block = _Block(hierarchy, basis, self)
+        highest = float(4 * system.weights.sum() * hierarchy.unit**2)  # of an uncut grid
         poles: list[float] = []
         worst, converged = 0.0, targets.shifts.size == 0
         while not converged and len(poles) < self.max_blocks * LANES:
-            shifts = targets.next(np.array(poles), basis.lowest()) if poles else targets.first()
+            shifts = targets.next(np.array(poles), basis.lowest(), highest) if poles else targets.first()
             worst = block.measure(shifts)
             converged = bool(poles) and worst <= _ACCEPTED * self.rtol
             if not converged:
                 basis.extend(block.solve())
                 poles.extend(shifts)
         if not converged and poles:
-            worst = block.measure(targets.next(np.array(poles), basis.lowest()))
+            worst = block.measure(targets.next(np.array(poles), basis.lowest(), highest))
             converged = worst <= _ACCEPTED * self.rtol
         iterations = block.iterations
         del block
@@ -197,16 +205,32 @@ def _hyperfield(
     system: System, rho: NDArray[np.float64], basis: ReducedBasis, shifts: Small, rtol: float, error: float
 ) -> Hyperfield:
     """Compress the basis for the range of shifts and put the operator back in the unit of the spacing."""
-    columns, gram, mass, stiffness = basis.compress(shifts, _DROPPED * rtol)
-    stiffness /= min(system.shape.spacing) ** 2
-    error += _STORAGE_ROUNDINGS * float(np.finfo(columns.dtype).eps)
-    return Hyperfield(system.shape, rho, columns, gram, mass, stiffness, system.boundary, error)
+    reduced = basis.compress(shifts, _DROPPED * rtol)
+    error += _STORAGE_ROUNDINGS * float(np.finfo(reduced.columns.dtype).eps)
+    return Hyperfield(
+        system.shape,
+        rho,
+        reduced.columns,
+        reduced.gram,
+        reduced.mass,
+        reduced.stiffness / min(system.shape.spacing) ** 2,
+        reduced.source,
+        system.boundary,
+        error,
+    )
 
 
 def _ratio(numerator: Small, denominator: Small) -> NDArray[np.float32]:
     """Quotient by lane, zero for a lane that has nothing left to solve."""
     quotient = np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > 0)
     return quotient.astype(np.float32)
+
+
+def _box_eigenvalue(system: System) -> float:
+    """Lowest eigenvalue of A on the whole grid, a lower bound of that on the shape, in squared units."""
+    counts = np.array(system.shape.mask.shape)
+    weights = system.weights * min(system.shape.spacing) ** 2
+    return float(np.sum(4 * weights * np.sin(np.pi / (2 * counts)) ** 2))
 
 
 def _lowest_ritz(steps: NDArray[np.float32], turns: NDArray[np.float32]) -> float:
