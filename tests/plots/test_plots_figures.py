@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from types import SimpleNamespace
 
 import numpy as np
@@ -41,6 +42,7 @@ def fake_maps(shape: Shape, n_maps: int = 3) -> SimpleNamespace:
         rho=np.array([1.0, 2, 5, np.inf]),
         explained=explained / explained.sum(),
         variance=explained,
+        centred=False,
     )
 
 
@@ -56,12 +58,21 @@ def test_row_zero_is_at_the_top(ax: Axes) -> None:
     assert grid[3, 3] == 4
 
 
-def test_outside_is_transparent(ax: Axes) -> None:
-    """No colour is given to pixels outside the shape."""
-    shape = elbow()
-    image = draw_values(shape, np.ones(5), ax)
-    opacity = image.to_rgba(image.get_array())[..., 3]
-    np.testing.assert_array_equal(opacity > 0, shape.mask)
+def test_colours_end_at_the_outline() -> None:
+    """Every pixel within the outline is coloured and none beyond it, with a hole left clear."""
+    x, y = np.meshgrid(*[np.arange(-9.0, 10)] * 2, indexing="ij")
+    radius = np.hypot(x, y)
+    shape = Shape.from_mask((radius < 8.2) & (radius > 3.3))
+    figure = new_figure(2, 2)
+    figure.set_layout_engine("none")
+    ax = figure.add_axes((0, 0, 1, 1))
+    draw_values(shape, np.ones(shape.n_nodes), ax)
+    opacity = np.asarray(Image.open(BytesIO(figure_png(figure, dpi=100))))[..., 3]
+    voxel = 200 / shape.mask.shape[0]
+    x, y = np.meshgrid(*[(np.arange(200) - 99.5) / voxel] * 2, indexing="ij")
+    radius = np.hypot(x, y)
+    assert (opacity[(radius < 7.8) & (radius > 3.7)] == 255).all()
+    assert (opacity[(radius > 8.8) | (radius < 2.9)] == 0).all()
 
 
 def test_signed_values_are_centred(ax: Axes) -> None:
@@ -147,7 +158,10 @@ def test_even_rows() -> None:
     figure, axes = panels(6, columns=5)
     assert len(axes) == 6
     assert axes[0].get_subplotspec().get_gridspec().get_geometry() == (2, 3)
-    assert figure.canvas is not None
+    figure.draw_without_rendering()
+    tops = [round(axis.get_position().y1, 6) for axis in axes]
+    assert tops == [tops[0]] * 3 + [tops[3]] * 3
+    assert tops[0] > tops[3]
 
 
 @pytest.mark.parametrize("grid", [(9,), (6, 7), (4, 5, 6)])
@@ -225,5 +239,5 @@ def test_real_silhouette(data_dir, ax: Axes) -> None:
     pixels = np.array(Image.open(data_dir / "kimia99" / "hand.png"))
     shape = Shape.from_mask(pixels == 255, name="hand")
     image = draw_values(shape, np.ones(shape.n_nodes), ax, contours=False)
-    np.testing.assert_array_equal(~np.ma.getmaskarray(image.get_array()), shape.mask)
+    assert image.get_array().shape == shape.mask.shape
     assert len(draw_outline(shape, ax).get_paths()) == 1

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from spem.errors import ParameterError, ShapeError
 from spem.plots.camera import Camera, principal_view, view_rotation
+from spem.plots.figures import figure_fields
 from spem.plots.level import surface_level
 from spem.plots.raster import render_surface, vertex_normals
 from spem.plots.style import SOLID, new_figure
@@ -239,3 +240,12 @@ def test_section_has_the_very_colours_of_the_colour_map() -> None:
     wanted = np.rint(255 * np.array(mpl.colormaps["viridis"](0.3))).astype(int)
     same = (np.abs(picture.astype(int) - wanted) <= 1).all(axis=2)
     assert same.mean() > 0.3
+
+
+def test_the_surface_of_fields_is_one() -> None:
+    """A cube cut open shows the end of the colour map on its whole faces, not the nearest node's value."""
+    shape = Shape.from_mask(np.ones((8, 8, 8)))
+    picture = figure_fields(shape, np.full((512, 1), 0.2), view=(0, 40)).axes[0].images[0].get_array()
+    tints = picture[picture[..., 3] == 255][:, :3].astype(float)
+    yellow = tints[:, 0] / tints.max(axis=1) > 0.9
+    assert yellow.mean() > 0.15

@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.collections import LineCollection
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 from skimage.measure import find_contours
 
 from spem.errors import ParameterError, ShapeError
+from spem.plots.extension import extend_values
 from spem.plots.level import surface_level
 from spem.plots.style import COLOURS, FIELD_CMAP, INK, MAP_CMAP, bare, framed
 from spem.plots.values import node_values, value_limits
@@ -33,10 +36,12 @@ def draw_values(
     symmetric: bool = False,
     limits: tuple[float, float] | None = None,
     contours: bool = False,
+    boundary: float | None = None,
 ) -> AxesImage:
     """Draw node values of a two-dimensional shape as an image in its own coordinates.
 
-    Axis 0 goes down and axis 1 right, as in the image file; outside the shape nothing is drawn.
+    Axis 0 goes down and axis 1 right, as in the image file. Colours are interpolated between the
+    nodes and end at the outline; outside it nothing is drawn.
 
     Parameters
     ----------
@@ -54,6 +59,8 @@ def draw_values(
         Values at the ends of the colour map; by default those of `values`.
     contours
         Whether to draw lines of equal value.
+    boundary
+        Value on the outline, where it is known.
 
     Raises
     ------
@@ -70,14 +77,19 @@ def draw_values(
     """
     _require_dimension(shape, 2, "an image")
     nodal = node_values(shape, values)
-    grid = shape.to_grid(nodal)
-    image = _draw_grid(
-        shape, grid, (0, 1), ax, cmap, symmetric, limits or value_limits(nodal, symmetric=symmetric)
-    )
+    level = surface_level(shape)
+    grid = extend_values(shape, nodal, level, boundary=boundary)
+    ends = limits or value_limits(nodal, symmetric=symmetric)
+    image = _draw_grid(shape, grid, level, (0, 1), ax, cmap or (MAP_CMAP if symmetric else FIELD_CMAP), ends)
     if contours:
-        low, high = image.get_clim()
-        levels = np.linspace(low, high, CONTOURS + 2)[1:-1]
-        _draw_levels(shape, grid, levels, ax)
+        lines = [
+            line
+            for value in np.linspace(*ends, CONTOURS + 2)[1:-1]
+            for line in _contour_lines(shape, grid, float(value), (0, 1))
+        ]
+        drawn = LineCollection(lines, colors="white", linewidths=0.5, alpha=0.75)
+        ax.add_collection(drawn)
+        drawn.set_clip_path(image.get_clip_path())
     return image
 
 
@@ -108,7 +120,10 @@ def draw_outline(shape: Shape, ax: Axes, *, colour: str = INK, width: float = 1.
     """
     _require_dimension(shape, 2, "an outline")
     lines = LineCollection(
-        _contour_lines(shape, surface_level(shape), 0.0), colors=colour, linewidths=width, capstyle="round"
+        _contour_lines(shape, surface_level(shape), 0.0, (0, 1)),
+        colors=colour,
+        linewidths=width,
+        capstyle="round",
     )
     ax.add_collection(lines)
     _frame_grid(shape, (0, 1), ax)
@@ -168,9 +183,10 @@ def draw_slice(
         msg = f"{shape.name}: axis {axis} has planes 0 to {shape.mask.shape[axis] - 1}, not {index}"
         raise ParameterError(msg)
     down, right = (a for a in range(3) if a != axis)
-    plane: NDArray[np.float64] = np.take(shape.to_grid(nodal), index, axis=axis)
-    limits = limits or value_limits(nodal, symmetric=symmetric)
-    return _draw_grid(shape, plane, (down, right), ax, None, symmetric, limits)
+    level = surface_level(shape)
+    grid, cut = (np.take(a, index, axis=axis) for a in (extend_values(shape, nodal, level), level))
+    ends = limits or value_limits(nodal, symmetric=symmetric)
+    return _draw_grid(shape, grid, cut, (down, right), ax, MAP_CMAP if symmetric else FIELD_CMAP, ends)
 
 
 def draw_line(shape: Shape, values: ArrayLike, ax: Axes, *, colour: str = COLOURS[0]) -> Line2D:
@@ -217,23 +233,22 @@ def _require_dimension(shape: Shape, wanted: int, what: str) -> None:
 def _draw_grid(
     shape: Shape,
     grid: NDArray[np.float64],
+    level: NDArray[np.float64],
     axes: tuple[int, int],
     ax: Axes,
-    cmap: str | None,
-    symmetric: bool,
+    cmap: str,
     limits: tuple[float, float],
 ) -> AxesImage:
-    """Draw a plane of the grid with its first axis down, transparent where it is NaN."""
-    left, right, bottom, top = _extent(shape, axes)
+    """Draw a plane of the grid with its first axis down, as far as its level is positive."""
+    low, high = limits
+    extent = _extent(shape, axes)
     image = ax.imshow(
-        np.ma.masked_invalid(grid),
-        cmap=cmap or (MAP_CMAP if symmetric else FIELD_CMAP),
-        vmin=limits[0],
-        vmax=limits[1],
-        extent=(left, right, bottom, top),
-        interpolation="nearest",
-        aspect="equal",
+        grid, cmap=cmap, vmin=low, vmax=high, extent=extent, interpolation="bilinear", aspect="equal"
     )
+    # Lines around holes run the other way than those around parts, so holes stay clear.
+    lines = _contour_lines(shape, level, 0.0, axes)
+    path = Path.make_compound_path(*map(Path, lines)) if lines else Path(np.empty((0, 2)))
+    image.set_clip_path(PathPatch(path, transform=ax.transData))
     bare(ax)
     return image
 
@@ -254,15 +269,9 @@ def _frame_grid(shape: Shape, axes: tuple[int, int], ax: Axes) -> None:
     bare(ax)
 
 
-def _contour_lines(shape: Shape, grid: NDArray[np.float64], level: float) -> list[NDArray[np.float64]]:
-    """Polylines (x, y) of a level of a grid, in the shape's coordinates."""
-    return [
-        (np.asarray(shape.origin) + line * np.asarray(shape.spacing))[:, ::-1]
-        for line in find_contours(grid, level)
-    ]
-
-
-def _draw_levels(shape: Shape, grid: NDArray[np.float64], levels: NDArray[np.float64], ax: Axes) -> None:
-    """Draw thin lines of equal value inside the shape."""
-    lines = [line for level in levels for line in _contour_lines(shape, grid, float(level))]
-    ax.add_collection(LineCollection(lines, colors="white", linewidths=0.5, alpha=0.75))
+def _contour_lines(
+    shape: Shape, grid: NDArray[np.float64], level: float, axes: tuple[int, int]
+) -> list[NDArray[np.float64]]:
+    """Polylines (x, y) of a level of a plane of the grid, in the shape's coordinates."""
+    start, step = (np.array([whole[a] for a in axes]) for whole in (shape.origin, shape.spacing))
+    return [(start + line * step)[:, ::-1] for line in find_contours(grid, level)]

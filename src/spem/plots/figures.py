@@ -77,8 +77,8 @@ def figure_fields(
     n_fields = fields.shape[1]
     captions = _titles(titles, n_fields)
     figure, axes = panels(n_fields, columns=columns, aspect=_aspect(shape, view))
-    limits = [(0.0, 1.0)] * n_fields
-    _fill(shape, fields, axes, limits, symmetric=False, contours=contours, view=view)
+    limits, surface = [(0.0, 1.0)] * n_fields, [1.0] * n_fields
+    _fill(shape, fields, axes, limits, surface, symmetric=False, contours=contours, view=view)
     _caption(shape, axes, captions)
     if shape.ndim > 1:
         _colour_bar(figure, axes, FIELD_CMAP, (0.0, 1.0), ["0", "v", "1"])
@@ -111,14 +111,20 @@ def figure_maps(
     >>> from types import SimpleNamespace
     >>> from spem.shapes.shape import Shape
     >>> shape = Shape.from_mask(np.ones((3, 3)))
-    >>> maps = SimpleNamespace(shape=shape, values=np.ones((9, 2)), explained=np.array([0.97, 0.03]))
+    >>> share, basis = np.array([0.97, 0.03]), np.eye(2)
+    >>> maps = SimpleNamespace(
+    ...     shape=shape, values=np.ones((9, 2)), explained=share, basis=basis, centred=False
+    ... )
     >>> figure_maps(maps).axes[0].get_title()
     'P₁  97 %'
     """
     values = node_columns(maps.shape, maps.values)[:, :n_maps]
     figure, axes = panels(values.shape[1], columns=columns, aspect=_aspect(maps.shape, view))
     limits = [value_limits(column, symmetric=True) for column in values.T]
-    _fill(maps.shape, values, axes, limits, symmetric=True, contours=False, view=view)
+    # On the surface v = 1 for every ρ; the mean field that centred maps lack is not known here.
+    surface = [None if maps.centred else float(vector.sum()) for vector in np.asarray(maps.basis).T]
+    surface = surface[: values.shape[1]]
+    _fill(maps.shape, values, axes, limits, surface, symmetric=True, contours=False, view=view)
     titles = [f"{map_name(j)}  {_percent(maps.explained[j])}" for j in range(values.shape[1])]
     _caption(maps.shape, axes, titles)
     if maps.shape.ndim > 1:
@@ -134,7 +140,10 @@ def map_picture(maps: Maps, n_maps: int = 4) -> bytes:
     >>> from types import SimpleNamespace
     >>> from spem.shapes.shape import Shape
     >>> shape = Shape.from_mask(np.ones((3, 3)))
-    >>> map_picture(SimpleNamespace(shape=shape, values=np.ones((9, 1)), explained=np.ones(1)))[:4]
+    >>> maps = SimpleNamespace(
+    ...     shape=shape, values=np.ones((9, 1)), explained=np.ones(1), basis=np.ones((1, 1)), centred=False
+    ... )
+    >>> map_picture(maps)[:4]
     b'\x89PNG'
     """
     return figure_png(figure_maps(maps, n_maps=n_maps, columns=n_maps), dpi=90)
@@ -191,6 +200,7 @@ def _fill(
     values: NDArray[np.float64],
     axes: list[Axes],
     limits: list[tuple[float, float]],
+    boundary: Sequence[float | None],
     *,
     symmetric: bool,
     contours: bool,
@@ -198,15 +208,17 @@ def _fill(
 ) -> None:
     """Draw a column of values on each axis, in the way of the shape's dimension."""
     if shape.ndim == 3:
-        _fill_surfaces(shape, values, axes, limits, MAP_CMAP if symmetric else FIELD_CMAP, view)
+        _fill_surfaces(shape, values, axes, limits, boundary, symmetric=symmetric, view=view)
         return
-    for ax, column, ends in zip(axes, values.T, limits, strict=True):
+    for ax, column, ends, known in zip(axes, values.T, limits, boundary, strict=True):
         if shape.ndim == 1:
             draw_line(shape, column, ax)
             if not symmetric:
                 ax.set_ylim(-0.02, 1.05)
         else:
-            draw_values(shape, column, ax, symmetric=symmetric, limits=ends, contours=contours)
+            draw_values(
+                shape, column, ax, symmetric=symmetric, limits=ends, contours=contours, boundary=known
+            )
             draw_outline(shape, ax, width=0.7)
 
 
@@ -215,21 +227,27 @@ def _fill_surfaces(
     values: NDArray[np.float64],
     axes: list[Axes],
     limits: list[tuple[float, float]],
-    cmap: str,
+    boundary: Sequence[float | None],
+    *,
+    symmetric: bool,
     view: View | None,
 ) -> None:
-    """Draw each column on one surface, cut open across the axis that faces the viewer most."""
+    """Draw each column on one surface, cut open across the axis that faces the viewer most.
+
+    Fields are 1 on the surface; maps, constant on it too, are shown as they are one voxel below.
+    """
     rotation = principal_view(shape.points) if view is None else view_rotation(view)
     surface = shape_surface(shape, int(np.abs(rotation[2]).argmax()), toward=rotation[2])
     size = (PANEL_PIXELS, max(1, round(PANEL_PIXELS * _aspect(shape, rotation))))
-    for ax, column, ends in zip(axes, values.T, limits, strict=True):
+    for ax, column, ends, known in zip(axes, values.T, limits, boundary, strict=True):
+        shown = surface_values(shape, surface, column, boundary=known)
         picture = render_surface(
             surface.vertices,
             surface.faces,
-            surface_values(shape, surface, column),
+            shown if symmetric else np.where(surface.section, shown, 1.0),
             view=rotation,
             size=size,
-            cmap=cmap,
+            cmap=MAP_CMAP if symmetric else FIELD_CMAP,
             limits=ends,
             unlit=surface.cut_faces,
         )

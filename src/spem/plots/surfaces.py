@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import map_coordinates
-from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
 from spem.errors import ParameterError, ShapeError
 from spem.plots.camera import principal_view, view_rotation
+from spem.plots.extension import extend_values
 from spem.plots.level import surface_level
 from spem.plots.raster import render_surface, vertex_normals
 from spem.plots.style import FIELD_CMAP, MAP_CMAP, bare
-from spem.plots.values import node_values, value_limits
+from spem.plots.values import value_limits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,8 +55,7 @@ class Surface:
     @property
     def cut_faces(self) -> NDArray[np.bool_]:
         """``(n_faces,)`` True on the plane that cuts the shape open."""
-        flat: NDArray[np.bool_] = self.section[self.faces].all(axis=1)
-        return flat
+        return np.asarray(self.section[self.faces].all(axis=1))
 
 
 def shape_surface(shape: Shape, cut: int | None = None, *, toward: ArrayLike = (1.0, 1.0, 1.0)) -> Surface:
@@ -107,8 +106,10 @@ def shape_surface(shape: Shape, cut: int | None = None, *, toward: ArrayLike = (
     return Surface(vertices, faces, samples, section)
 
 
-def surface_values(shape: Shape, surface: Surface, values: ArrayLike) -> NDArray[np.float64]:
-    """Return the values that a surface shows: interpolated between the nodes just inside it.
+def surface_values(
+    shape: Shape, surface: Surface, values: ArrayLike, *, boundary: float | None = None
+) -> NDArray[np.float64]:
+    """Return the values that a surface shows: interpolated one voxel below it, and on its section.
 
     Parameters
     ----------
@@ -118,6 +119,8 @@ def surface_values(shape: Shape, surface: Surface, values: ArrayLike) -> NDArray
         From `shape_surface`.
     values
         ``(n_nodes,)`` one value a node.
+    boundary
+        Value on the surface, where it is known; the section is interpolated up to it.
 
     Returns
     -------
@@ -131,15 +134,8 @@ def surface_values(shape: Shape, surface: Surface, values: ArrayLike) -> NDArray
     >>> surface_values(shape, shape_surface(shape), np.full(27, 0.5)).round(6).max()
     np.float64(0.5)
     """
-    nodal = node_values(shape, values)
-    where = surface.samples.T
-    share = map_coordinates(shape.mask.astype(np.float64), where, order=1, mode="constant")
-    total = map_coordinates(shape.to_grid(nodal, fill=0.0), where, order=1, mode="constant")
-    shown: NDArray[np.float64] = total / np.maximum(share, 1e-12)
-    lost = share < 1e-3
-    if lost.any():
-        nodes = np.stack(np.unravel_index(shape.voxels, shape.mask.shape), axis=1)
-        shown[lost] = nodal[cKDTree(nodes).query(surface.samples[lost])[1]]
+    extended = extend_values(shape, values, surface_level(shape), boundary=boundary)
+    shown: NDArray[np.float64] = map_coordinates(extended, surface.samples.T, order=1, mode="nearest")
     return shown
 
 
