@@ -81,6 +81,9 @@ def test_missing_rho_is_wrong_usage(spem: Spem, image: Path, tmp_path: Path) -> 
     ("options", "word"),
     [
         (("--rho-min", "5", "--rho-max", "2"), "ascending"),
+        (("--rho-min", "50"), "--rho-max is 5."),
+        (("--rho-max", "0.1"), "--rho-min is 0.5"),
+        (("--rho-max", "0"), "positive"),
         (("--n-maps", "9", "--n-rho", "4"), "n_maps=9"),
         (("--device", "cuda"), "--device cuda"),
         (("--voxels", "500", "--spacing", "1"), "exclude each other"),

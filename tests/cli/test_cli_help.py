@@ -5,11 +5,17 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from enum import StrEnum
+from typing import get_args
 
 import pytest
 from typer.testing import Result
 
 import spem as package
+from spem.cli.options import BoundaryChoice, ComponentsChoice, SchemeChoice
+from spem.codes.settings import Components
+from spem.fields.operator import Boundary
+from spem.fields.rho import Scheme
 
 COMMANDS = ("info", "field", "maps", "encode", "search", "evaluate", "demo")
 HEAVY = (
@@ -40,6 +46,14 @@ def test_help_names_all_commands(spem: Callable[..., Result]) -> None:
     text = spem("--help").stdout
     assert all(command in text for command in COMMANDS)
     assert spem().exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("choice", "kind"), [(BoundaryChoice, Boundary), (SchemeChoice, Scheme), (ComponentsChoice, Components)]
+)
+def test_choices_are_those_of_the_library(choice: type[StrEnum], kind: object) -> None:
+    """The command line, which loads no solver for its help, offers what the library takes."""
+    assert tuple(choice) == get_args(kind)
 
 
 def test_version(spem: Callable[..., Result]) -> None:

@@ -20,6 +20,7 @@ from spem.cli.options import (
     Plot,
     SchemeChoice,
     ShapeFile,
+    SignedDistance,
     Spacing,
     Threshold,
     Voxels,
@@ -66,6 +67,7 @@ def field(
     threshold: Threshold = None,
     dark: Dark = None,
     label: Label = None,
+    signed_distance: SignedDistance = None,
     components: Components = ComponentsChoice.largest,
     device: Device = "cpu",
     json: Json = False,
@@ -86,7 +88,8 @@ def field(
 
     values_of_rho = check_rho(rho)
     grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius}
-    found = read_shape(shape, **grid, threshold=threshold, dark=dark, label=label, components=components)  # type: ignore[arg-type]
+    values = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
+    found = read_shape(shape, **grid, **values, components=components)  # type: ignore[arg-type]
     tell_repairs(found)
     _check_drawable(found, plot)
     from spem.api import field as solve
@@ -123,6 +126,7 @@ def maps(
     threshold: Threshold = None,
     dark: Dark = None,
     label: Label = None,
+    signed_distance: SignedDistance = None,
     components: Components = ComponentsChoice.largest,
     device: Device = "cpu",
     json: Json = False,
@@ -141,12 +145,14 @@ def maps(
     check_device(device)
     _check_targets(output, plot)
     grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius}
-    found = read_shape(shape, **grid, threshold=threshold, dark=dark, label=label, components=components)  # type: ignore[arg-type]
+    values = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
+    found = read_shape(shape, **grid, **values, components=components)  # type: ignore[arg-type]
     tell_repairs(found)
     _check_drawable(found, plot)
     from spem.api import maps as project
     from spem.fields.rho import sample_rho
 
+    _check_bounds(found.size, rho_min, rho_max)
     rho = sample_rho(found.size, rho_min, rho_max, n_rho, rho_scheme.value)
     result = project(found, n_maps, centred=centred, rho=rho, boundary=boundary.value)
     arrays = {"basis": result.basis, "variance": result.variance, "rho": rho, "spacing": found.spacing}
@@ -159,6 +165,19 @@ def maps(
     summary = {"boundary": boundary.value, "rho": rho[[0, -1]], "n_rho": rho.size, "n_maps": n_maps}
     summary |= {"variance": result.variance, "explained": result.explained}
     _summarise(found, summary, output, plot, json=json)
+
+
+def _check_bounds(size: float, low: float | None, high: float | None) -> None:
+    """Refuse one bound of ρ that lies beyond what the other is by default."""
+    from spem.fields.rho import DEFAULT_RANGE
+
+    least, largest = (share * size for share in DEFAULT_RANGE)
+    if high is None and low is not None and low >= largest:
+        msg = f"--rho-min {low:g}: --rho-max is {largest:g} by default, for a shape of this size; give it too"
+        raise ParameterError(msg)
+    if low is None and high is not None and 0 < high <= least:
+        msg = f"--rho-max {high:g}: --rho-min is {least:g} by default, for a shape of this size; give it too"
+        raise ParameterError(msg)
 
 
 def _check_targets(output: Path | None, plot: Path | None) -> None:
