@@ -14,22 +14,20 @@ import spem
 from spem.plots.figures import figure_fields, figure_maps
 from spem.plots.profiles import draw_basis, draw_profiles
 from spem.plots.thumbnails import thumbnail
-from spem.shapes.creatures import collection, creature
 
 FOLDER = Path(__file__).parent / "images"
 
 
-def save(figure: Figure, name: str) -> None:
-    """Write a figure to the folder of pictures."""
-    FigureCanvasAgg(figure)
-    figure.savefig(FOLDER / name, dpi=110, bbox_inches="tight")
+def main(folder: Path = FOLDER, *, share: float = 1.0) -> None:
+    """Draw every picture, of shapes with this share of their voxels."""
+    folder.mkdir(exist_ok=True)
 
+    def save(figure: Figure, name: str) -> None:
+        FigureCanvasAgg(figure)
+        figure.savefig(folder / name, dpi=110, bbox_inches="tight")
 
-def main() -> None:
-    """Draw every picture."""
-    FOLDER.mkdir(exist_ok=True)
-    flat = creature("hand", voxels=9_000, rng=np.random.default_rng(4))
-    solid = creature("dog", ndim=3, voxels=40_000, rng=np.random.default_rng(2))
+    flat = spem.creatures.creature("hand", voxels=int(9_000 * share), rng=np.random.default_rng(4))
+    solid = spem.creatures.creature("dog", ndim=3, voxels=int(40_000 * share), rng=np.random.default_rng(2))
     field = spem.sweep(flat)
     rho = np.array([0.03, 0.06, 0.12, 0.25]) * flat.size
     save(figure_fields(flat, field.at(rho), [f"ρ = {r:.2g}" for r in rho], columns=4), "fields.png")
@@ -43,14 +41,14 @@ def main() -> None:
     draw_profiles(field, nodes, middle, shape_ax=left)
     draw_basis(spem.maps(field, n_maps=4), right)
     save(profiles, "profiles.png")
-    save(answers(), "answers.png")
+    save(answers(share), "answers.png")
 
 
-def answers() -> Figure:
+def answers(share: float = 1.0) -> Figure:
     """Draw the first answers to a query of four kinds, among creatures of all kinds."""
     rng = np.random.default_rng(1)
-    shapes, labels = zip(*collection(n_per_class=6, rng=rng), strict=True)
-    codes = spem.encode(list(shapes))
+    shapes, labels = zip(*spem.creatures.collection(n_per_class=6, rng=rng), strict=True)
+    codes = spem.encode(list(shapes), voxels=int(15_000 * share))
     figure = Figure(figsize=(9, 5.4), layout="constrained")
     rows = figure.subplots(4, 6)
     for row, kind in zip(rows, ("human", "ant", "giraffe", "crab"), strict=True):
