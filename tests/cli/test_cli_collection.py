@@ -118,6 +118,17 @@ def test_vocabulary_is_saved_and_reused(spem: Spem, folder: Path, codes: Path, t
     np.testing.assert_array_equal(Codes.load(second).vectors, Codes.load(codes).vectors)
 
 
+def test_interruption_of_saving_is_told_as_any(
+    spem: Spem, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C while the codes are saved keeps the work and says how to go on."""
+    monkeypatch.setattr(Codes, "save", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    result = spem("encode", folder, "-o", tmp_path / "c.spem", *QUICK)
+    assert result.exit_code == 130
+    assert "give the same command again to go on" in result.stderr
+    assert len(list((tmp_path / "c.spem.work").rglob("*.work"))) == 9
+
+
 @pytest.mark.parametrize(
     ("options", "word"),
     [

@@ -192,13 +192,13 @@ def encode_paths(
                 progress=bar.advance,
                 on_failure=_report,
             )
+            failures = codes.failures
+            if known is not None:
+                codes = merge(known, codes)
+            codes.save(output)
         except KeyboardInterrupt:
             msg = f"interrupted; what is done is kept in {work}: give the same command again to go on"
             raise KeyboardInterrupt(msg) from None
-    failures = codes.failures
-    if known is not None:
-        codes = merge(known, codes)
-    codes.save(output)
     clear_work(work)
     return codes, failures
 
