@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from spem.retrieval.evaluation import PrecisionRecall, Scores, bulls_eye, precision_recall
     from spem.retrieval.ranking import Answer
     from spem.shapes import creatures, synthetic
+    from spem.shapes.levels import signed_distance_shape
     from spem.shapes.read import read, read_all
     from spem.shapes.shape import Cuts, Report, Shape
 
@@ -79,6 +80,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "read",
     "read_all",
     "search",
+    "signed_distance_shape",
     "sweep",
     "synthetic",
 ]
@@ -124,6 +126,7 @@ _HOME = {
     "read": "spem.shapes.read",
     "read_all": "spem.shapes.read",
     "search": "spem.collections",
+    "signed_distance_shape": "spem.shapes.levels",
     "sweep": "spem.api",
     "synthetic": "spem.shapes.synthetic",
 }

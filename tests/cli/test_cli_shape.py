@@ -105,6 +105,19 @@ def test_pictures_need_no_arrays(spem: Spem, image: Path, tmp_path: Path, comman
     assert [p.name for p in tmp_path.iterdir()] == ["p.png"]
 
 
+def test_signed_distances_are_cut_at_zero(spem: Spem, tmp_path: Path) -> None:
+    """--signed-distance names the sign inside; info, field and maps take it."""
+    x = np.arange(30) - 14.2
+    distance = np.hypot(x[:, None], x) - 8.3
+    np.save(tmp_path / "sd.npy", distance)
+    option = ("--signed-distance", "negative", "--json")
+    facts = json.loads(spem("info", tmp_path / "sd.npy", *option).stdout)
+    assert facts["voxels"] == np.count_nonzero(distance < 0)
+    for command in (("field", "--rho", "2"), ("maps", "--n-maps", "2")):
+        result = spem(command[0], tmp_path / "sd.npy", *command[1:], *option, "-o", tmp_path / "out.npz")
+        assert json.loads(result.stdout)["voxels"] == facts["voxels"]
+
+
 def test_label_and_polarity_options(spem: Spem, tmp_path: Path, image: Path) -> None:
     """--label takes one label of a volume, --dark the ground of a bright shape."""
     np.save(tmp_path / "labels.npy", [[0, 3, 3, 0, 7], [0, 3, 3, 0, 7]])

@@ -88,8 +88,8 @@ def field(
 
     values_of_rho = check_rho(rho)
     grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius}
-    values = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
-    found = read_shape(shape, **grid, **values, components=components)  # type: ignore[arg-type]
+    inside = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
+    found = read_shape(shape, **grid, **inside, components=components)  # type: ignore[arg-type]
     tell_repairs(found)
     _check_drawable(found, plot)
     from spem.api import field as solve
@@ -145,8 +145,8 @@ def maps(
     check_device(device)
     _check_targets(output, plot)
     grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius}
-    values = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
-    found = read_shape(shape, **grid, **values, components=components)  # type: ignore[arg-type]
+    inside = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
+    found = read_shape(shape, **grid, **inside, components=components)  # type: ignore[arg-type]
     tell_repairs(found)
     _check_drawable(found, plot)
     from spem.api import maps as project

@@ -14,6 +14,7 @@ from spem.cli.options import (
     Json,
     Label,
     ShapeFile,
+    SignedDistance,
     Spacing,
     Threshold,
     Voxels,
@@ -33,6 +34,7 @@ def info(
     threshold: Threshold = None,
     dark: Dark = None,
     label: Label = None,
+    signed_distance: SignedDistance = None,
     components: Components = ComponentsChoice.largest,
     json: Json = False,
 ) -> None:
@@ -52,6 +54,7 @@ def info(
         threshold=threshold,
         dark=dark,
         label=label,
+        signed_distance=signed_distance,
         components=components,
     )
     facts = describe(found)

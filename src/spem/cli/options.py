@@ -37,6 +37,13 @@ class ComponentsChoice(StrEnum):
     all = "all"
 
 
+class SideChoice(StrEnum):
+    """The sign that a signed distance has inside."""
+
+    negative = "negative"
+    positive = "positive"
+
+
 ShapeFile = Annotated[Path, typer.Argument(metavar="SHAPE", help="Image, volume or mesh.")]
 Voxels = Annotated[
     int | None,
@@ -58,6 +65,10 @@ Dark = Annotated[
     typer.Option("--dark/--light", help="Whether the shape is darker than the ground. [by the border]"),
 ]
 Label = Annotated[int | None, typer.Option(help="The label to take from a label volume.")]
+SignedDistance = Annotated[
+    SideChoice | None,
+    typer.Option(help="The volume holds signed distances to the surface, of this sign inside."),
+]
 Components = Annotated[ComponentsChoice, typer.Option(help="Keep the largest component or all.")]
 Boundary = Annotated[
     BoundaryChoice,
@@ -99,6 +110,7 @@ def read_shape(
     threshold: float | None = None,
     dark: bool | None = None,
     label: int | None = None,
+    signed_distance: SideChoice | None = None,
     components: ComponentsChoice = ComponentsChoice.largest,
 ) -> Shape:
     """Read a shape as the options say.
@@ -118,6 +130,7 @@ def read_shape(
         threshold=threshold,
         dark=dark,
         label=label,
+        signed_distance=None if signed_distance is None else signed_distance.value,
         components=components.value,
     )
 
