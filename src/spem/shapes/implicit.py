@@ -8,7 +8,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spem.errors import ParameterError, ShapeError, SizeError
+from spem.errors import ParameterError, ShapeError
+from spem.shapes.grids import spacing_per_axis
+from spem.shapes.limits import check_size
 from spem.shapes.shape import Cuts, Report, Shape
 
 Level = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -16,8 +18,10 @@ Level = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 # Points handed to a level function at a time: small blocks stay in cache and let the function
 # leave out what is far away.
 BLOCK_POINTS = 8192
-# A grid of more voxels than this is refused before it is allocated (8 bytes each).
-MAX_GRID = 2**28
+# The level twice as float64 and masks: the most held for one voxel.
+_BYTES_PER_VOXEL = 20
+# So many voxels along an axis are over any limit, and still a whole number.
+_MOST = 2.0**60
 # Cuts are found to this fraction of an edge.
 CUT_TOLERANCE = 1e-13
 # Levels below this fraction of the largest are taken for zero.
@@ -65,7 +69,7 @@ def implicit_shape(
     ShapeError
         If no voxel centre lies inside.
     SizeError
-        If the grid would have more than `MAX_GRID` voxels.
+        If the grid would pass the memory limit, SPEM_MEMORY_LIMIT or 2 GiB.
 
     Examples
     --------
@@ -139,23 +143,16 @@ def _frame(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, ...]]:
     """Return the first centre, the spacing and the number of voxels of a grid over a box."""
     lower, upper = np.atleast_1d(np.asarray(low, float)), np.atleast_1d(np.asarray(high, float))
-    step = np.broadcast_to(np.asarray(spacing, float), lower.shape).copy()
-    if not (np.all(np.isfinite(step)) and np.all(step > 0)):
-        msg = f"{name}: spacing {spacing} must be positive and finite"
-        raise ParameterError(msg)
+    step = np.array(spacing_per_axis(spacing, lower.size, name))
     if lower.shape != upper.shape or not np.all(upper > lower):
         msg = f"{name}: the box from {lower.tolist()} to {upper.tolist()} is empty"
         raise ParameterError(msg)
     # One layer outside the box on either side keeps the shape off the border whatever the offset.
     shift = np.broadcast_to(np.asarray(offset, float), lower.shape) % 1.0
     start = lower + (shift - 1) * step
-    counts = np.ceil((upper - start) / step) + 2
-    if np.prod(counts) > MAX_GRID:
-        msg = (
-            f"{name}: a grid of {np.prod(counts):.3g} voxels is over the {MAX_GRID} limit; take a coarser one"
-        )
-        raise SizeError(msg)
-    return start, step, tuple(int(c) for c in counts)
+    counts = tuple(int(c) for c in np.minimum(np.ceil((upper - start) / step) + 2, _MOST))
+    check_size(counts, _BYTES_PER_VOXEL, None, name)
+    return start, step, counts
 
 
 def _cut(
