@@ -98,6 +98,51 @@ def test_island_in_a_hollow_is_a_solid() -> None:
     assert np.isclose(mended.volume, parts[0].volume * (1 - 0.7**3 + 0.3**3))
 
 
+@pytest.mark.parametrize("radius", [1.0, 0.9])
+@pytest.mark.parametrize("order", [1, -1])
+def test_an_inside_out_part_that_pokes_out_is_turned(radius, order) -> None:
+    """A reversed sphere partly in another is no hollow of it, whatever the order of its faces."""
+    one, two = trimesh.creation.icosphere(3), trimesh.creation.icosphere(3, radius=radius)
+    two.apply_translation([0.95, 0, 0]).invert()
+    surface = surface_of(one, two)
+    middles = surface.vertices[surface.faces[len(one.faces) :]].mean(axis=1)[:, 0]
+    moved = len(one.faces) + np.argsort(order * middles)
+    faces = np.concatenate([surface.faces[: len(one.faces)], surface.faces[moved]])
+    mended = mend(Surface(surface.vertices, faces))
+    assert np.isclose(mended.volume, one.volume * (1 + radius**3))
+    assert mended.repairs == ("turned 1 of 2 parts right side out",)
+
+
+def test_a_bar_whose_ends_alone_are_within_is_turned() -> None:
+    """A reversed bar from arm to arm of a U is outside of it between them."""
+    arms = [trimesh.creation.box((1, 1, 4)).apply_translation([x, 0, 0]) for x in (-2, 2)]
+    bar = trimesh.creation.box((4, 0.5, 0.5))
+    bar.invert()
+    assert mend(surface_of(*arms, bar)).repairs == ("turned 1 of 3 parts right side out",)
+
+
+def test_overlapping_hollows_are_both_hollows() -> None:
+    """Two reversed spheres that overlap within a ball stay as they are."""
+    parts = [trimesh.creation.icosphere(2, radius=radius) for radius in (1.0, 0.3, 0.29)]
+    parts[1].apply_translation([0.2, 0, 0]).invert()
+    parts[2].apply_translation([-0.1, 0, 0]).invert()
+    assert mend(surface_of(*parts)).repairs == ()
+
+
+def test_a_pocket_flush_with_a_wall_is_a_hollow() -> None:
+    """A reversed box that shares a part of a face with the box around it stays as it is."""
+    outer, pocket = trimesh.creation.box((2, 2, 2)), trimesh.creation.box((1, 1, 1))
+    pocket.apply_translation([0, 0, 0.5]).invert()
+    assert np.isclose(mend(surface_of(outer, pocket)).volume, 7)
+
+
+def test_a_part_that_is_there_twice_is_no_hollow_of_itself() -> None:
+    """A sphere and the same sphere reversed are both solids."""
+    one, two = trimesh.creation.icosphere(2), trimesh.creation.icosphere(2)
+    two.invert()
+    assert np.isclose(mend(surface_of(one, two)).volume, 2 * one.volume)
+
+
 def test_surfaces_given_are_not_changed(ball: Surface) -> None:
     """Mending leaves the arrays it was given alone."""
     faces = ball.faces[:, ::-1].copy()

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-# A hollow's winding number in the parts around it is one, that of a part outside them zero.
-INSIDE = 0.5
+from spem.shapes.hollows import part_turns
+
 # A sphere has volume 0.094 area^1.5; rounding of coordinates leaves flat surfaces some 1e-16.
 FLAT = 1e-12
 
@@ -134,8 +134,8 @@ def mend(surface: Surface) -> Surface:
 
     On surfaces that are not closed, or that have each face from both sides, degenerate and
     repeated faces are dropped and faces turned to agree with most of their patch. Then, on all,
-    parts wound inside out are turned, unless they are hollows of larger parts. Holes are left
-    open. No vertex moves.
+    parts wound inside out are turned, unless they lie wholly within others, as hollows. Holes are
+    left open. No vertex moves.
 
     Parameters
     ----------
@@ -237,14 +237,7 @@ def _turn_parts(surface: Surface) -> Surface:
     edges = np.concatenate([surface.faces[:, :2], surface.faces[:, 1:]])
     count, label = _connect(edges, len(surface.vertices))
     part = label[surface.faces[:, 0]]
-    volume = np.bincount(part, surface.face_volumes, count)
-    turn = np.full(count, -1.0 if surface.volume < 0 else 1.0)
-    backward = np.flatnonzero(turn * volume < 0)
-    for p in backward[np.argsort(-np.abs(volume[backward]), kind="stable")]:
-        larger = (np.abs(volume) > abs(volume[p]))[part]
-        seen = surface.triangles[larger] - surface.triangles[np.argmax(part == p), 0]
-        if np.dot(_solid_angles(seen), turn[part[larger]]) < INSIDE * 4 * np.pi:
-            turn[p] = -turn[p]
+    turn = part_turns(surface.triangles, part, np.bincount(part, surface.face_volumes, count))
     if not (turn < 0).any():
         return surface
     turned = (turn < 0)[part]
@@ -252,12 +245,3 @@ def _turn_parts(surface: Surface) -> Surface:
     n, used = np.unique(part[turned]).size, np.unique(part).size
     what = "the surface" if n == used else f"{n} of {used} parts"
     return surface.with_faces(faces, f"turned {what} right side out")
-
-
-def _solid_angles(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the solid angle of triangles seen from 0, positive from behind (Van Oosterom, Strackee 1983)."""
-    a, b, c = triangles.transpose(1, 0, 2)
-    la, lb, lc = np.linalg.norm(triangles, axis=2).T
-    triple = np.einsum("ni,ni->n", a, np.cross(b, c))
-    dots = np.einsum("ni,ni->n", a, b) * lc + np.einsum("ni,ni->n", b, c) * la
-    return np.asarray(2 * np.arctan2(triple, la * lb * lc + dots + np.einsum("ni,ni->n", c, a) * lb))
