@@ -14,8 +14,9 @@ from spem.errors import ParameterError, ShapeError
 from spem.plots.curves import draw_precision_recall
 from spem.plots.fields import draw_line, draw_outline, draw_slice, draw_values
 from spem.plots.figures import figure_fields, figure_maps, figure_slices, map_name, map_picture
+from spem.plots.layout import panels
 from spem.plots.profiles import draw_basis, draw_profiles, draw_variance
-from spem.plots.style import figure_png, image_png, new_figure, panels
+from spem.plots.style import figure_png, image_png, new_figure
 from spem.plots.values import value_limits
 from spem.shapes.shape import Cuts, Shape
 

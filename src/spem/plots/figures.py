@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 
 from spem.errors import ParameterError
 from spem.plots.camera import principal_view, view_aspect, view_rotation
 from spem.plots.fields import draw_line, draw_outline, draw_slice, draw_values
+from spem.plots.layout import colour_bar, curve_panels, panels
 from spem.plots.raster import render_surface
-from spem.plots.style import FIELD_CMAP, MAP_CMAP, MUTED, TEXT_SIZE, bare, figure_png, panels
+from spem.plots.style import FIELD_CMAP, MAP_CMAP, TEXT_SIZE, bare, figure_png
 from spem.plots.surfaces import shape_surface, surface_values
 from spem.plots.values import node_columns, value_limits
 
@@ -27,7 +26,10 @@ if TYPE_CHECKING:
     from spem.plots.camera import View
     from spem.shapes.shape import Shape
 
-PANEL_PIXELS = 420
+# Pixels of a shaded picture for each of the figure: a little finer.
+SHARPNESS = 1.35
+# Of the map pictures in reports.
+MAP_DPI = 110
 
 
 def figure_fields(
@@ -76,12 +78,12 @@ def figure_fields(
     fields = node_columns(shape, values)
     n_fields = fields.shape[1]
     captions = _titles(titles, n_fields)
-    figure, axes = panels(n_fields, columns=columns, aspect=_aspect(shape, view))
+    figure, axes = _panels(shape, n_fields, columns, view, titled=titles is not None)
     limits, surface = [(0.0, 1.0)] * n_fields, [1.0] * n_fields
     _fill(shape, fields, axes, limits, surface, symmetric=False, contours=contours, view=view)
     _caption(shape, axes, captions)
     if shape.ndim > 1:
-        _colour_bar(figure, axes, FIELD_CMAP, (0.0, 1.0), ["0", "v", "1"])
+        colour_bar(figure, axes[0], FIELD_CMAP, (0.0, 1.0), ["0", "v", "1"])
     return figure
 
 
@@ -119,7 +121,7 @@ def figure_maps(
     'P₁  97 %'
     """
     values = node_columns(maps.shape, maps.values)[:, :n_maps]
-    figure, axes = panels(values.shape[1], columns=columns, aspect=_aspect(maps.shape, view))
+    figure, axes = _panels(maps.shape, values.shape[1], columns, view, titled=True)
     limits = [value_limits(column, symmetric=True) for column in values.T]
     # On the surface v = 1 for every ρ; the mean field that centred maps lack is not known here.
     surface = [None if maps.centred else float(vector.sum()) for vector in np.asarray(maps.basis).T]
@@ -128,12 +130,12 @@ def figure_maps(
     titles = [f"{map_name(j)}  {_percent(maps.explained[j])}" for j in range(values.shape[1])]
     _caption(maps.shape, axes, titles)
     if maps.shape.ndim > 1:
-        _colour_bar(figure, axes, MAP_CMAP, (-1.0, 1.0), ["−", "0", "+"])
+        colour_bar(figure, axes[0], MAP_CMAP, (-1.0, 1.0), ["−", "0", "+"])
     return figure
 
 
 def map_picture(maps: Maps, n_maps: int = 4) -> bytes:
-    r"""Return a row of the leading maps as a small PNG file, as reports show it.
+    r"""Return the leading maps, two in a row, as a small PNG file that can be read on a phone.
 
     Examples
     --------
@@ -146,7 +148,7 @@ def map_picture(maps: Maps, n_maps: int = 4) -> bytes:
     >>> map_picture(maps)[:4]
     b'\x89PNG'
     """
-    return figure_png(figure_maps(maps, n_maps=n_maps, columns=n_maps), dpi=90)
+    return figure_png(figure_maps(maps, n_maps=n_maps, columns=2), dpi=MAP_DPI)
 
 
 def figure_slices(shape: Shape, values: ArrayLike, *, symmetric: bool = False) -> Figure:
@@ -173,7 +175,7 @@ def figure_slices(shape: Shape, values: ArrayLike, *, symmetric: bool = False) -
     3
     """
     reach = max(n * h for n, h in zip(shape.mask.shape, shape.spacing, strict=True)) / 2
-    figure, axes = panels(3, width=2.2)
+    figure, axes = panels(3)
     for axis, ax in enumerate(axes):
         draw_slice(shape, values, ax, axis=axis, symmetric=symmetric)
         # All three on one scale: equal squares about the middle of each slice.
@@ -238,7 +240,8 @@ def _fill_surfaces(
     """
     rotation = principal_view(shape.points) if view is None else view_rotation(view)
     surface = shape_surface(shape, int(np.abs(rotation[2]).argmax()), toward=rotation[2])
-    size = (PANEL_PIXELS, max(1, round(PANEL_PIXELS * _aspect(shape, rotation))))
+    pixels = round(SHARPNESS * axes[0].bbox.width)
+    size = (pixels, max(1, round(pixels * _aspect(shape, rotation))))
     for ax, column, ends, known in zip(axes, values.T, limits, boundary, strict=True):
         shown = surface_values(shape, surface, column, boundary=known)
         picture = render_surface(
@@ -255,16 +258,23 @@ def _fill_surfaces(
         bare(ax)
 
 
-def _aspect(shape: Shape, view: View | None) -> float:
-    """Height over width of the picture of a shape, between one fifth and two."""
+def _panels(
+    shape: Shape, n_panels: int, columns: int, view: View | None, *, titled: bool
+) -> tuple[Figure, list[Axes]]:
+    """Axes for curves or for pictures, in the way of the shape's dimension."""
     if shape.ndim == 1:
-        return 0.6
+        return curve_panels(n_panels, columns=columns)
+    return panels(n_panels, columns=columns, aspect=_aspect(shape, view), titled=titled, bar=True)
+
+
+def _aspect(shape: Shape, view: View | None) -> float:
+    """Height over width of the picture of a shape, between one eighth and four."""
     if shape.ndim == 2:
         down, right = (n * h for n, h in zip(shape.mask.shape, shape.spacing, strict=True))
-        return float(np.clip(down / right, 0.2, 2.0))
+        return float(np.clip(down / right, 0.125, 4.0))
     points = shape.points
     seen = view_aspect(points, principal_view(points) if view is None else view)
-    return float(np.clip(seen, 0.2, 2.0))
+    return float(np.clip(seen, 0.125, 4.0))
 
 
 def _titles(titles: Sequence[str] | None, n_panels: int) -> list[str]:
@@ -294,17 +304,3 @@ def _percent(fraction: float) -> str:
     if percent > 99:
         return f"{min(percent, 99.99):.2f} %" if fraction < 1 else "100 %"
     return f"{percent:.2g} %"
-
-
-def _colour_bar(
-    figure: Figure, axes: list[Axes], cmap: str, limits: tuple[float, float], words: list[str]
-) -> None:
-    """Draw one slim scale for all panels."""
-    rows = axes[0].get_subplotspec().get_gridspec().nrows  # type: ignore[union-attr]
-    scale = ScalarMappable(Normalize(*limits), cmap)
-    bar = figure.colorbar(
-        scale, ax=axes, fraction=0.03, pad=0.015, aspect=20, shrink=0.85 / rows, anchor=(0.0, 1.0)
-    )
-    bar.set_ticks(list(np.linspace(*limits, 3)), labels=words)
-    bar.ax.tick_params(length=0, labelsize=TEXT_SIZE, labelcolor=MUTED)
-    bar.outline.set_visible(False)

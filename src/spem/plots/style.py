@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from io import BytesIO
-from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,43 +47,6 @@ def new_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
-
-
-def panels(
-    n_panels: int, *, columns: int = 5, width: float = 1.9, aspect: float = 1.0
-) -> tuple[Figure, list[Axes]]:
-    """Return a figure with a grid of `n_panels` axes, at most `columns` in a row, in even rows.
-
-    Parameters
-    ----------
-    n_panels
-        Number of axes wanted, at least one.
-    columns
-        Most axes in a row.
-    width
-        Width of one panel, in inches.
-    aspect
-        Height of the pictures over their width; extreme ones are bounded.
-
-    Raises
-    ------
-    ParameterError
-        If there is nothing to draw.
-
-    Examples
-    --------
-    >>> figure, axes = panels(7)
-    >>> len(axes)
-    7
-    """
-    if n_panels < 1:
-        msg = "nothing to draw: at least one panel is needed"
-        raise ParameterError(msg)
-    down = ceil(n_panels / columns)
-    across = ceil(n_panels / down)
-    height = width * min(max(aspect, 0.3), 1.6) + 0.25  # the title
-    figure = new_figure(across * width, down * height)
-    return figure, [figure.add_subplot(down, across, i + 1) for i in range(n_panels)]
 
 
 def bare(ax: Axes, title: str = "") -> None:

@@ -1,0 +1,141 @@
+"""Where the panels of a figure stand: sizes in inches, with no more room than titles and scale need."""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+
+from spem.errors import ParameterError
+from spem.plots.style import MUTED, TEXT_SIZE, new_figure
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Width of a panel by how many stand in a row; of more, the last.
+WIDTHS = (3.6, 2.7, 2.2, 1.9)
+# Panels of tall shapes are narrower instead of higher than this many widths, but leave room for a title.
+TALLEST = 1.6
+NARROWEST = 0.95
+MARGIN, GAP, TITLE = 0.06, 0.12, 0.27
+# From the last panel to the scale, its width, and its words.
+BAR = (0.12, 0.1, 0.24)
+BAR_HEIGHT = 2.0
+
+
+def panels(
+    n_panels: int, *, columns: int = 5, aspect: float = 1.0, titled: bool = True, bar: bool = False
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with a grid of `n_panels` axes for pictures, at most `columns` in a row, in even rows.
+
+    Parameters
+    ----------
+    n_panels
+        Number of axes wanted, at least one.
+    columns
+        Most axes in a row.
+    aspect
+        Height of the pictures over their width.
+    titled
+        Whether room is left for titles.
+    bar
+        Whether room is left for `colour_bar`.
+
+    Raises
+    ------
+    ParameterError
+        If there is nothing to draw.
+
+    Examples
+    --------
+    >>> figure, axes = panels(7)
+    >>> len(axes)
+    7
+    """
+    down, across = _grid(n_panels, columns)
+    width = WIDTHS[min(across, len(WIDTHS)) - 1]
+    height = width * min(aspect, TALLEST)
+    width = max(min(width, height / aspect), NARROWEST)
+    above = TITLE if titled else 0.0
+    step = above + (GAP if down > 1 else 0.0)
+    right = across * (width + GAP) - GAP + MARGIN
+    full = right + (sum(BAR) if bar else MARGIN), 2 * MARGIN + above + down * height + (down - 1) * step
+    figure = new_figure(*full)
+    figure.set_layout_engine("none")
+    grid = figure.add_gridspec(
+        down,
+        across,
+        left=MARGIN / full[0],
+        right=right / full[0],
+        bottom=MARGIN / full[1],
+        top=1 - (MARGIN + above) / full[1],
+        wspace=GAP / width,
+        hspace=step / height,
+    )
+    return figure, [figure.add_subplot(grid[divmod(i, across)]) for i in range(n_panels)]
+
+
+def curve_panels(n_panels: int, *, columns: int = 5) -> tuple[Figure, list[Axes]]:
+    """Return a figure with a grid of `n_panels` axes that keep room for ticks and labels.
+
+    Examples
+    --------
+    >>> figure, axes = curve_panels(2)
+    >>> figure.get_size_inches().tolist()
+    [5.4, 2.1]
+    """
+    down, across = _grid(n_panels, columns)
+    width = WIDTHS[min(across, len(WIDTHS)) - 1]
+    figure = new_figure(across * width, down * round(0.6 * width + TITLE + 0.21, 2))
+    return figure, [figure.add_subplot(down, across, i + 1) for i in range(n_panels)]
+
+
+def colour_bar(
+    figure: Figure, ax: Axes, cmap: str, limits: tuple[float, float], words: Sequence[str]
+) -> None:
+    """Draw one slim scale for all panels, in the room that `panels` left beside the first row.
+
+    Parameters
+    ----------
+    figure
+        From `panels`, with ``bar=True``.
+    ax
+        Its first axis.
+    cmap
+        Matplotlib colour map.
+    limits
+        Values at the ends of the colour map.
+    words
+        What to write along the scale, evenly spaced.
+
+    Examples
+    --------
+    >>> figure, axes = panels(1, bar=True)
+    >>> colour_bar(figure, axes[0], "viridis", (0, 1), ["0", "1"])
+    >>> len(figure.axes)
+    2
+    """
+    width, height = figure.get_size_inches()
+    row = ax.get_subplotspec().get_position(figure)  # type: ignore[union-attr]
+    tall = min(0.9 * row.height, BAR_HEIGHT / height)
+    left = 1 - (BAR[1] + BAR[2]) / width
+    room = figure.add_axes((left, (row.y0 + row.y1 - tall) / 2, BAR[1] / width, tall))
+    bar = figure.colorbar(ScalarMappable(Normalize(*limits), cmap), cax=room)
+    bar.set_ticks(list(np.linspace(*limits, len(words))), labels=list(words))
+    bar.ax.tick_params(length=0, labelsize=TEXT_SIZE, labelcolor=MUTED)
+    bar.outline.set_visible(False)
+
+
+def _grid(n_panels: int, columns: int) -> tuple[int, int]:
+    """Rows and columns of panels; rows are as even as can be."""
+    if n_panels < 1:
+        msg = "nothing to draw: at least one panel is needed"
+        raise ParameterError(msg)
+    down = ceil(n_panels / columns)
+    return down, ceil(n_panels / down)
