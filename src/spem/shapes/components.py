@@ -92,8 +92,6 @@ def _label(shape: Shape) -> tuple[NDArray[np.int32], int]:
     direction = np.tile(np.arange(signed.size), touched.size)
     end = start + signed[direction]
     cut = np.isin(start * signed.size + direction, shape.cuts.voxel * signed.size + shape.cuts.direction)
-    # a cut listed from one end alone cuts the edge all the same
-    cut |= np.isin(end * signed.size + (direction ^ 1), shape.cuts.voxel * signed.size + shape.cuts.direction)
     joins = flat[end] & ~cut
     pair = (labels.ravel()[start[joins]] - 1, labels.ravel()[end[joins]] - 1)
     total = count + touched.size
