@@ -82,6 +82,79 @@ def test_a_transparent_palette_colour_is_background(tmp_path):
     assert "opaque shape" in shape.report.method
 
 
+def test_opacity_that_parts_no_shape_from_its_ground_does_not_hide_the_drawing():
+    """A clear corner or a solid pixel among nearly solid ones leaves a black bar on white as it is."""
+    drawing = colours(np.where(BAR, 0, 255).astype(np.uint8))
+    corner = np.full(BAR.shape, 255, np.uint8)
+    corner[0, 0] = 0
+    nearly = np.full(BAR.shape, 254, np.uint8)
+    nearly[5, 5] = 255
+    for alpha in (corner, nearly):
+        shape = image_shape(np.dstack([drawing, alpha]))
+        assert shape.n_nodes == BAR.sum()
+        assert "dark shape on bright" in shape.report.method
+        assert shape.report.repairs == ("put on white by its opacity",)
+
+
+def test_opacity_is_taken_where_it_alone_tells_the_shape():
+    """Of one colour, whatever of it reaches the border; half transparent; or white on nothing."""
+    wide = np.ones((12, 16), bool)
+    wide[:3, :3] = wide[-3:, -3:] = False
+    for inside, solid, colour in ((BAR, 255, 255), (BAR, 128, 255), (wide, 255, 0), (wide, 255, 200)):
+        alpha = np.where(inside, solid, 0).astype(np.uint8)
+        shape = image_shape(np.dstack([colours(np.full_like(alpha, colour)), alpha]))
+        assert shape.n_nodes == inside.sum()
+        assert shape.report.method == f"two opacities, 0 and {solid}; opaque shape"
+
+
+@pytest.mark.parametrize("kind", [np.uint16, np.float32, np.float64])
+def test_opacity_has_the_scale_of_its_numbers(kind):
+    """Sixteen bits and shares of one put a half transparent bar on white alike."""
+    top = 65535 if kind is np.uint16 else 1
+    alpha = np.where(BAR, top, top * 0.5).astype(kind)
+    shape = image_shape(np.dstack([np.zeros_like(alpha), alpha]))
+    assert shape.n_nodes == BAR.sum()
+    assert "dark shape on bright" in shape.report.method
+
+
+def test_masked_pixels_are_refused():
+    """A mask is not dropped in silence; one that masks nothing is no mask."""
+    pixels = np.ma.masked_array(BAR.astype(float), mask=np.zeros_like(BAR))
+    assert image_shape(pixels).n_nodes == BAR.sum()
+    pixels[2, 3] = np.ma.masked
+    with pytest.raises(ShapeError, match=r"image: 1 of 192 values are masked, the first at \[2, 3\]; give"):
+        image_shape(pixels)
+
+
+@pytest.mark.parametrize("suffix", ["jpg", "png", "tif", "webp"])
+@pytest.mark.parametrize("orientation", [3, 6, 7])
+def test_exif_orientation_is_honoured(tmp_path, suffix, orientation):
+    """A shape stands as a viewer shows it, and the report says that it was turned."""
+    path = tmp_path / f"turned.{suffix}"
+    tall = np.zeros((16, 24), bool)
+    tall[1:9, 2:20] = tall[9:12, 2:6] = True
+    image = Image.fromarray(np.where(tall, 255, 0).astype(np.uint8)).convert("RGB")
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    image.save(path, exif=exif, **({"lossless": True} if suffix == "webp" else {}))
+    shape = read_image(path)
+    upright = {3: tall[::-1, ::-1], 6: np.rot90(tall, -1), 7: tall[::-1, ::-1].T}[orientation]
+    assert np.array_equal(shape.mask[1:-1, 1:-1], upright[upright.any(1)][:, upright.any(0)])
+    assert shape.report.repairs == (f"turned as its EXIF orientation {orientation} says",)
+
+
+@pytest.mark.parametrize(("kind", "top"), [(float, 1.7e308), (float, 1e-320), ("f4", 3e38), ("f2", 6e4)])
+def test_grey_levels_of_any_size_are_told_apart(kind, top):
+    """Neither huge nor tiny floating point numbers overflow, and the method has them as they are."""
+    coverage, area = disk()
+    shape = image_shape(((2 * coverage - 1) * top).astype(kind))
+    assert shape.volume == pytest.approx(area, rel=0.005)
+    assert "area coverage" in shape.report.method
+    shape = image_shape(((2 * coverage - 1) * top).astype(kind), threshold=top / 2)
+    assert f"over {top / 2:.4g} (given)" in shape.report.method
+    assert image_shape((BAR * top).astype(kind)).n_nodes == BAR.sum()
+
+
 def test_polarity_is_told_from_the_border_and_can_be_given():
     """Most of the border is background, whichever way round; an argument overrides."""
     for pixels in (BAR, ~BAR):
@@ -145,7 +218,7 @@ def test_colours_of_one_luminance_are_told_by_their_widest_channel():
     pixels[BAR] = (255, 0, 0)
     shape = image_shape(pixels)
     assert shape.n_nodes == BAR.sum()
-    assert "red channel" in shape.report.method
+    assert "levels of the red channel, 0 and 255; luminance is flat; bright shape" in shape.report.method
 
 
 def test_the_first_frame_of_an_animation_is_taken(tmp_path):

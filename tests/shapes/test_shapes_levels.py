@@ -138,3 +138,39 @@ def test_otsu_agrees_with_the_reference_on_two_peaks():
     rng = np.random.default_rng(0)
     values = np.concatenate([rng.normal(20, 4, 4000), rng.normal(60, 9, 2000)])
     assert abs(otsu_level(values) - threshold_otsu(values)) < 2 * np.ptp(values) / 256
+
+
+@pytest.mark.parametrize("kind", ["f2", "f4", "f8", "u1", "i8"])
+def test_otsu_takes_every_kind_of_number(kind):
+    """Two peaks are parted between them in any precision."""
+    values = np.array([0, 1, 2, 98, 99, 100], kind)
+    assert 2 <= otsu_level(values) < 98
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "kind"),
+    [
+        (-1.7e308, 1.7e308, "f8"),
+        (-3e38, 3e38, "f4"),
+        (0, 5e-324, "f8"),
+        (1, 1 + 2**-52, "f8"),
+        (1, 1 + 2**-23, "f4"),
+    ],
+)
+def test_otsu_parts_any_two_numbers(low, high, kind):
+    """Huge, denormal and adjacent numbers have a level with one of them above it."""
+    values = np.array([low, low, high], kind)
+    assert (values > otsu_level(values)).tolist() == [False, False, True]
+
+
+def test_masked_levels_are_refused():
+    """A level function and a signed distance have a value everywhere."""
+    values = np.ma.masked_greater([-1.0, 1.0, 2.0], 1.5)
+    for make in (level_shape, signed_distance_shape):
+        with pytest.raises(ShapeError, match=r"shape: 1 of 3 values are masked, the first at \[2\]"):
+            make(values)
+
+
+def test_huge_levels_are_cut_where_they_are_zero():
+    """The difference of two levels may be beyond the largest number."""
+    assert level_shape([-1.5e308, 0.5e308, -0.5e308]).cuts.fraction == pytest.approx([0.25, 0.5])

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import threading
 import zlib
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 
 from spem.errors import ReadError, ShapeError, SpemError
 from spem.shapes.coverage import coverage_cuts, is_coverage
-from spem.shapes.levels import border_repairs, level_shape, otsu_level, refuse_non_finite
+from spem.shapes.grey import Grey, grey_levels
+from spem.shapes.levels import border_repairs, level_shape, otsu_level, refuse_masked
 from spem.shapes.limits import check_file, check_size
 from spem.shapes.shape import Cuts, Report, Shape
 
 # Decoded colour, grey level as float32 and as level function, masks: the most held for one pixel.
 _BYTES_PER_PIXEL = 24
-_LUMINANCE = (0.299, 0.587, 0.114)
 # What decoders raise on damaged files.
 _DAMAGED = (
     OSError,
@@ -39,15 +40,6 @@ _DAMAGED = (
 _DECODER = threading.Lock()
 
 
-@dataclass(frozen=True, eq=False)
-class _Grey:
-    """A scalar image, how it came about, and whether it is opacity, whose polarity is known."""
-
-    level: NDArray[Any]
-    method: str
-    opacity: bool = False
-
-
 def read_image(
     path: str | Path,
     *,
@@ -58,6 +50,9 @@ def read_image(
     name: str | None = None,
 ) -> Shape:
     """Read a silhouette from an image file: PNG, GIF, JPEG, TIFF, BMP, WebP, PNM.
+
+    It is turned as its EXIF orientation says. Opacity is the shape where it parts one from its
+    ground; else what is not solid is put on white.
 
     Parameters
     ----------
@@ -97,8 +92,8 @@ def read_image(
     check_file(path)
     pixels, repairs = _decode(path, memory_limit)
     name = name or path.stem
-    grey = _scalar(pixels, name)
-    return _silhouette(grey, spacing, threshold, dark, name, Report(str(path), repairs=repairs))
+    report = Report(str(path), repairs=repairs)
+    return _silhouette(grey_levels(pixels, name), spacing, threshold, dark, name, report)
 
 
 def image_shape(
@@ -111,6 +106,8 @@ def image_shape(
     name: str = "image",
 ) -> Shape:
     """Make a silhouette of the pixels of an image.
+
+    Opacity is the shape where it parts one from its ground; else what is not solid is put on white.
 
     Parameters
     ----------
@@ -131,13 +128,14 @@ def image_shape(
     Raises
     ------
     ShapeError
-        When the array is no image, has a single grey level, NaN or no pixel inside.
+        When the array is no image, has a single grey level, NaN, masked entries or no pixel inside.
 
     Examples
     --------
     >>> image_shape(np.pad(np.zeros((3, 8)), 2, constant_values=1.0)).report.method
     'two grey levels, 0 and 1; dark shape on bright'
     """
+    refuse_masked(array, name)
     pixels = np.asarray(array)
     if pixels.ndim == 2:
         pixels = pixels[:, :, None]
@@ -145,7 +143,7 @@ def image_shape(
         msg = f"{name}: an image is (rows, columns) or (rows, columns, 1 to 4), got {np.shape(array)}"
         raise ShapeError(msg)
     check_size(pixels.shape[:2], _BYTES_PER_PIXEL, memory_limit, name)
-    return _silhouette(_scalar(pixels, name), spacing, threshold, dark, name, Report("array"))
+    return _silhouette(grey_levels(pixels, name), spacing, threshold, dark, name, Report("array"))
 
 
 def _decode(path: Path, memory_limit: int | None) -> tuple[NDArray[Any], tuple[str, ...]]:
@@ -159,7 +157,8 @@ def _decode(path: Path, memory_limit: int | None) -> tuple[NDArray[Any], tuple[s
                 if frames > 1 and image.format == "TIFF":
                     msg = f"{path}: a TIFF of {frames} pages is a volume; read it with read_volume"
                     raise ReadError(msg)
-                pixels = _channels(image)
+                upright, turned = _upright(image)
+                pixels = _channels(upright)
         except SpemError:
             raise
         except UnidentifiedImageError as error:
@@ -171,7 +170,20 @@ def _decode(path: Path, memory_limit: int | None) -> tuple[NDArray[Any], tuple[s
             raise ReadError(msg) from error
         finally:
             Image.MAX_IMAGE_PIXELS = before
-    return pixels, (f"took the first of {frames} frames",) if frames > 1 else ()
+    return pixels, ((f"took the first of {frames} frames",) if frames > 1 else ()) + turned
+
+
+def _upright(image: Image.Image) -> tuple[Image.Image, tuple[str, ...]]:
+    """Return an image turned as its EXIF orientation says, and the phrase of the report about it."""
+    try:
+        # asked before the image is loaded, since a TIFF is turned by that
+        orientation = image.getexif().get(ExifTags.Base.Orientation, 1)
+    except _DAMAGED:
+        return image, ()
+    if orientation not in range(2, 9):
+        return image, ()
+    image.load()
+    return ImageOps.exif_transpose(image), (f"turned as its EXIF orientation {orientation} says",)
 
 
 def _channels(image: Image.Image) -> NDArray[Any]:
@@ -184,28 +196,8 @@ def _channels(image: Image.Image) -> NDArray[Any]:
     return pixels[:, :, None] if pixels.ndim == 2 else pixels
 
 
-def _scalar(pixels: NDArray[Any], name: str) -> _Grey:
-    """Make one number of each pixel: opacity where it varies, else luminance, else the widest channel."""
-    refuse_non_finite(pixels, name)
-    channels = pixels.shape[2]
-    if channels in (2, 4):
-        alpha = pixels[:, :, -1]
-        if alpha.min() != alpha.max():
-            return _Grey(alpha, "opacity", opacity=True)
-    if channels < 3:
-        return _Grey(pixels[:, :, 0], "grey level")
-    colours = [pixels[:, :, c].astype(np.float32) for c in range(3)]
-    luminance = sum((w * c for w, c in zip(_LUMINANCE, colours, strict=True)), np.float32(0))
-    spans = [float(np.ptp(c)) for c in colours]
-    # colours that differ in hue alone leave no edge in the luminance
-    if np.ptp(luminance) < 0.2 * max(spans):
-        widest = int(np.argmax(spans))
-        return _Grey(colours[widest], f"{('red', 'green', 'blue')[widest]} channel, the luminance being flat")
-    return _Grey(np.asarray(luminance), "luminance")
-
-
 def _silhouette(
-    grey: _Grey,
+    grey: Grey,
     spacing: float | tuple[float, ...],
     threshold: float | None,
     dark: bool | None,
@@ -213,44 +205,46 @@ def _silhouette(
     report: Report,
 ) -> Shape:
     """Tell inside from outside, and place the edges as finely as the grey levels allow."""
-    level = grey.level.astype(np.uint8) if grey.level.dtype == bool else grey.level
-    low, high = level.min(), level.max()
+    level, report = grey.level, report.with_repair(*grey.repairs)
+    low, high = float(level.min()), float(level.max())
     if low == high:
-        msg = f"{name}: the image has the single {grey.method} {low:g}, so there is no shape in it"
+        only = f"{grey.noun} {grey.of_image(low):g}"
+        msg = f"{name}: the image has the single {only}, so there is no shape in it"
         raise ShapeError(msg)
     two_valued = bool(((level == low) | (level == high)).all())
-    edge = _threshold(level, float(low), float(high), two_valued, threshold, name)
-    bright = level > edge
+    edge = _threshold(grey, low, high, two_valued, threshold, name)
+    bright = level == high if two_valued else level > edge
     dark = _shape_is_dark(bright, grey.opacity) if dark is None else dark
     polarity = _polarity(grey, dark)
     if two_valued:
-        report = _with_method(report, f"two {grey.method}s, {low:g} and {high:g}; {polarity}")
-        return _crisp(bright ^ dark, Cuts.none(), spacing, name, report)
+        found = f"two {grey.plural}, {grey.of_image(low):g} and {grey.of_image(high):g}"
+        return _crisp(bright ^ dark, Cuts.none(), spacing, name, _with_method(report, found, polarity))
     if threshold is None:
         coverage, middle = _coverage(level, bright, dark)
         inside = coverage > 0.5
         if inside.any() and is_coverage(coverage, inside):
-            method = f"{grey.method} over {middle:.4g} (midway); {polarity}; edges by area coverage"
+            found = f"{grey.noun} over {grey.of_image(middle):.4g} (midway)"
             cuts = coverage_cuts(coverage, inside)
-            return _crisp(inside, cuts, spacing, name, _with_method(report, method))
+            report = _with_method(report, found, polarity, "edges by area coverage")
+            return _crisp(inside, cuts, spacing, name, report)
     how = "Otsu" if threshold is None else "given"
-    method = f"{grey.method} over {edge:.4g} ({how}); {polarity}; edges by interpolation"
-    signed = level.astype(np.float32) - np.float32(edge)
-    return level_shape(-signed if dark else signed, spacing, name=name, report=_with_method(report, method))
+    found = f"{grey.noun} over {grey.of_image(edge):.4g} ({how})"
+    signed = level.astype(np.result_type(np.float32, level.dtype)) - edge
+    report = _with_method(report, found, polarity, "edges by interpolation")
+    return level_shape(-signed if dark else signed, spacing, name=name, report=report)
 
 
 def _threshold(
-    level: NDArray[Any], low: float, high: float, two_valued: bool, given: float | None, name: str
+    grey: Grey, low: float, high: float, two_valued: bool, given: float | None, name: str
 ) -> float:
     """Return the grey level of the edge, so that some pixels lie on either side."""
-    if given is not None:
-        if not low <= given < high:
-            msg = (
-                f"{name}: threshold={given:g} has all pixels on one side; grey levels run {low:g} to {high:g}"
-            )
-            raise ShapeError(msg)
-        return float(given)
-    return (low + high) / 2 if two_valued else otsu_level(level)
+    if given is None:
+        return (low + high) / 2 if two_valued else otsu_level(grey.level)
+    least, most = grey.of_image(low), grey.of_image(high)
+    if not least <= given < most:
+        msg = f"{name}: threshold={given:g} has all pixels on one side; grey levels run {least:g} to {most:g}"
+        raise ShapeError(msg)
+    return math.ldexp(given, -grey.exponent)
 
 
 def _shape_is_dark(bright: NDArray[np.bool_], opacity: bool) -> bool:
@@ -262,20 +256,21 @@ def _shape_is_dark(bright: NDArray[np.bool_], opacity: bool) -> bool:
     return bool(share > 0.5 or (share == 0.5 and bright.mean() > 0.5))
 
 
-def _polarity(grey: _Grey, dark: bool) -> str:
-    """Say which side is the shape."""
+def _polarity(grey: Grey, dark: bool) -> str:
+    """Say which side is the shape, and why it was told by these levels."""
     if grey.opacity:
         return "transparent shape" if dark else "opaque shape"
-    return "dark shape on bright" if dark else "bright shape on dark"
+    side = "dark shape on bright" if dark else "bright shape on dark"
+    return f"{grey.note}; {side}" if grey.note else side
 
 
 def _coverage(
     level: NDArray[Any], bright: NDArray[np.bool_], dark: bool
-) -> tuple[NDArray[np.float32], float]:
+) -> tuple[NDArray[np.floating], float]:
     """Scale grey levels to 0 on the background and 1 on the shape; return them and the middle level."""
     # medians, since ringing and noise spread the levels about the two that are meant
     lower, upper = (float(np.median(level[side])) for side in (~bright, bright))
-    share = (level.astype(np.float32) - np.float32(lower)) / np.float32(upper - lower)
+    share = (level.astype(np.result_type(np.float32, level.dtype)) - lower) / (upper - lower)
     return (1 - share if dark else share), (lower + upper) / 2
 
 
@@ -288,6 +283,6 @@ def _crisp(
     )
 
 
-def _with_method(report: Report, method: str) -> Report:
+def _with_method(report: Report, *phrases: str) -> Report:
     """Return the report with the method filled in."""
-    return Report(report.source, method, repairs=report.repairs)
+    return replace(report, method="; ".join(phrases))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any, Literal, TypeAlias
 
@@ -13,6 +14,8 @@ from spem.shapes.shape import Cuts, Report, Shape
 
 # The sign that a signed distance has inside.
 Side: TypeAlias = Literal["negative", "positive"]
+# Bins of Otsu's method, and how many values are put into them at a time.
+_BINS, _BLOCK = 256, 1 << 16
 
 
 def level_shape(
@@ -47,7 +50,7 @@ def level_shape(
     Raises
     ------
     ShapeError
-        When a value is NaN or infinite, or none is positive.
+        When a value is NaN, infinite or masked, or none is positive.
 
     Examples
     --------
@@ -55,6 +58,7 @@ def level_shape(
     >>> shape.cuts.fraction
     array([0.5 , 0.25])
     """
+    refuse_masked(level, name)
     values = np.asarray(level)
     if not np.issubdtype(values.dtype, np.floating):
         values = values.astype(np.float64)
@@ -103,7 +107,7 @@ def signed_distance_shape(
     Raises
     ------
     ShapeError
-        When a value is NaN or infinite, or no value has the inside's sign.
+        When a value is NaN, infinite or masked, or no value has the inside's sign.
     ParameterError
         When `inside` is neither word.
 
@@ -116,6 +120,7 @@ def signed_distance_shape(
     if inside not in ("negative", "positive"):
         msg = f"{name}: signed distance {inside!r} inside: expected 'negative' or 'positive'"
         raise ParameterError(msg)
+    refuse_masked(array, name)
     values = np.asarray(array, dtype=np.float64)
     refuse_non_finite(values, name)
     level = values if inside == "positive" else -values
@@ -146,15 +151,46 @@ def otsu_level(values: NDArray[Any]) -> float:
     >>> round(otsu_level(np.array([0.0, 0.1, 0.2, 7.8, 7.9, 8.0])))
     4
     """
-    counts, edges = np.histogram(values, 256)
-    centres = (edges[1:] + edges[:-1]) / 2
+    low, high = float(values.min()), float(values.max())
+    # scaled by a power of two, then to [0, 1]: neither overflows and neither rounds far
+    exponent = math.frexp(max(abs(low), abs(high)))[1]
+    start = math.ldexp(low, -exponent)
+    span = math.ldexp(high, -exponent) - start
+    counts = np.zeros(_BINS, np.int64)
+    flat = values.reshape(-1)
+    for first in range(0, flat.size, _BLOCK):
+        scaled = (np.ldexp(flat[first : first + _BLOCK].astype(np.float64), -exponent) - start) / span
+        counts += np.bincount(np.minimum((_BINS * scaled).astype(np.int64), _BINS - 1), minlength=_BINS)
+    share = _otsu_share(counts)
+    level = math.ldexp(start + share * span, exponent)
+    # in the precision of the values themselves, the highest must stay above
+    floating = np.issubdtype(values.dtype, np.floating)
+    return level if not floating or float(values.dtype.type(level)) < high else low
+
+
+def _otsu_share(counts: NDArray[np.int64]) -> float:
+    """Return the part of the range at which two classes of a histogram over [0, 1] differ most."""
+    centres = (np.arange(_BINS) + 0.5) / _BINS
     below = np.cumsum(counts)[:-1].astype(np.float64)
-    above = values.size - below
+    above = counts.sum() - below
     first = np.cumsum(counts * centres)
     means = first[:-1] / below - (first[-1] - first[:-1]) / above
     between = below * above * means**2
     best = np.flatnonzero(between >= between.max() * (1 - 1e-9))
-    return float((edges[best[0] + 1] + edges[best[-1] + 1]) / 2)
+    return float((best[0] + best[-1] + 2) / (2 * _BINS))
+
+
+def refuse_masked(values: Any, name: str) -> None:
+    """Raise ShapeError with the count and the first place of masked entries of a NumPy array, if any."""
+    if not np.ma.is_masked(values):
+        return
+    masked = np.ma.getmaskarray(values)
+    first = ", ".join(map(str, np.unravel_index(int(np.argmax(masked)), masked.shape)))
+    msg = (
+        f"{name}: {np.count_nonzero(masked)} of {masked.size} values are masked, the first at [{first}]; "
+        "give them a value that is outside, as array.filled(value) does"
+    )
+    raise ShapeError(msg)
 
 
 def refuse_non_finite(values: NDArray[Any], name: str) -> None:
@@ -208,6 +244,9 @@ def _linear_cuts(values: NDArray[np.floating], inside: NDArray[np.bool_]) -> Cut
     parts = []
     for direction, start, end in boundary_edges(inside):
         a, b = flat[start].astype(np.float64), flat[end].astype(np.float64)
+        # a - b may overflow where the values are huge, but not where they are scaled
+        scale = np.maximum(a, -b)
+        a, b = a / scale, b / scale
         # a tiny a against a large b underflows to zero, which is no fraction
         fraction = np.maximum(a / (a - b), np.finfo(np.float64).tiny)
         parts.append((start, np.full(start.size, direction, np.uint8), fraction))
