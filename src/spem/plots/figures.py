@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 # Pixels of a shaded picture for each of the figure: a little finer.
 SHARPNESS = 1.35
-# Of the map pictures in reports.
-MAP_DPI = 110
+# Panels of the map pictures in reports, in inches: narrow beside their titles.
+MAP_WIDTH = 1.5
 
 
 def figure_fields(
@@ -78,7 +78,7 @@ def figure_fields(
     fields = node_columns(shape, values)
     n_fields = fields.shape[1]
     captions = _titles(titles, n_fields)
-    figure, axes = _panels(shape, n_fields, columns, view, titled=titles is not None)
+    figure, axes = _panels(shape, n_fields, columns, view, None, titled=titles is not None)
     limits, surface = [(0.0, 1.0)] * n_fields, [1.0] * n_fields
     _fill(shape, fields, axes, limits, surface, symmetric=False, contours=contours, view=view)
     _caption(shape, axes, captions)
@@ -88,7 +88,12 @@ def figure_fields(
 
 
 def figure_maps(
-    maps: Maps, *, n_maps: int | None = None, view: View | None = None, columns: int = 5
+    maps: Maps,
+    *,
+    n_maps: int | None = None,
+    view: View | None = None,
+    columns: int = 5,
+    width: float | None = None,
 ) -> Figure:
     """Return a figure with a panel for each SPEM map, each coloured about zero on its own scale.
 
@@ -102,6 +107,8 @@ def figure_maps(
         View of three-dimensional shapes; their broad side by default.
     columns
         Most panels in a row.
+    width
+        Most width of a panel, in inches; by default the more, the fewer stand in a row.
 
     Raises
     ------
@@ -121,7 +128,7 @@ def figure_maps(
     'P₁  97 %'
     """
     values = node_columns(maps.shape, maps.values)[:, :n_maps]
-    figure, axes = _panels(maps.shape, values.shape[1], columns, view, titled=True)
+    figure, axes = _panels(maps.shape, values.shape[1], columns, view, width, titled=True)
     limits = [value_limits(column, symmetric=True) for column in values.T]
     # On the surface v = 1 for every ρ; the mean field that centred maps lack is not known here.
     surface = [None if maps.centred else float(vector.sum()) for vector in np.asarray(maps.basis).T]
@@ -148,7 +155,7 @@ def map_picture(maps: Maps, n_maps: int = 4) -> bytes:
     >>> map_picture(maps)[:4]
     b'\x89PNG'
     """
-    return figure_png(figure_maps(maps, n_maps=n_maps, columns=2), dpi=MAP_DPI)
+    return figure_png(figure_maps(maps, n_maps=n_maps, columns=2, width=MAP_WIDTH))
 
 
 def figure_slices(shape: Shape, values: ArrayLike, *, symmetric: bool = False) -> Figure:
@@ -259,12 +266,13 @@ def _fill_surfaces(
 
 
 def _panels(
-    shape: Shape, n_panels: int, columns: int, view: View | None, *, titled: bool
+    shape: Shape, n_panels: int, columns: int, view: View | None, width: float | None, *, titled: bool
 ) -> tuple[Figure, list[Axes]]:
     """Axes for curves or for pictures, in the way of the shape's dimension."""
     if shape.ndim == 1:
         return curve_panels(n_panels, columns=columns)
-    return panels(n_panels, columns=columns, aspect=_aspect(shape, view), titled=titled, bar=True)
+    aspect = _aspect(shape, view)
+    return panels(n_panels, columns=columns, aspect=aspect, width=width, titled=titled, bar=True)
 
 
 def _aspect(shape: Shape, view: View | None) -> float:

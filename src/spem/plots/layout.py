@@ -30,7 +30,13 @@ BAR_HEIGHT = 2.0
 
 
 def panels(
-    n_panels: int, *, columns: int = 5, aspect: float = 1.0, titled: bool = True, bar: bool = False
+    n_panels: int,
+    *,
+    columns: int = 5,
+    aspect: float = 1.0,
+    width: float | None = None,
+    titled: bool = True,
+    bar: bool = False,
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with a grid of `n_panels` axes for pictures, at most `columns` in a row, in even rows.
 
@@ -42,6 +48,8 @@ def panels(
         Most axes in a row.
     aspect
         Height of the pictures over their width.
+    width
+        Most width of a panel, in inches; by default the more, the fewer stand in a row.
     titled
         Whether room is left for titles.
     bar
@@ -59,7 +67,7 @@ def panels(
     7
     """
     down, across = _grid(n_panels, columns)
-    width = WIDTHS[min(across, len(WIDTHS)) - 1]
+    width = width or WIDTHS[min(across, len(WIDTHS)) - 1]
     height = width * min(aspect, TALLEST)
     width = max(min(width, height / aspect), NARROWEST)
     above = TITLE if titled else 0.0
