@@ -221,3 +221,62 @@ def test_thumbnail_of_four_dimensions_is_refused() -> None:
     """Shapes of more than three dimensions have no picture."""
     with pytest.raises(ShapeError, match="dimensions can be drawn"):
         thumbnail(Shape.from_mask(np.ones((2, 2, 2, 2))))
+
+
+def test_classes_are_in_natural_order(tmp_path: Path) -> None:
+    """Class 2 comes before class 10, in the table and in the gallery."""
+    labels = ["10", "10", "2", "2", "1", "1"]
+    distances = np.abs(np.subtract.outer(np.arange(6.0), np.arange(6.0)))
+    page = write_report(
+        tmp_path / "r.html",
+        title="t",
+        names=list("uvwxyz"),
+        labels=labels,
+        thumbnails=[None] * 6,
+        map_pictures=[thumbnail(Shape.from_mask(np.ones((2, 2))), 8), None] * 3,
+        scores=evaluate(distances, labels),
+    ).read_text(encoding="utf-8")
+    assert re.findall(r'<th scope="row">(\d+)</th>', page) == ["1", "2", "10"]
+    assert re.findall(r"<summary>(\d+) ", page) == ["1", "2", "10"]
+    assert re.findall(r"<figcaption>class (\d+)<br>", page) == ["1", "2", "10"]
+
+
+def test_perfect_answers_show_nothing_wrong(tmp_path: Path) -> None:
+    """Where every class comes first, no query is worst, no answer wrong, and E at its largest."""
+    labels = ["a"] * 3 + ["b"] * 4
+    position = np.array([0.0, 1, 2, 50, 51, 52, 53])
+    distances = np.abs(position[:, None] - position)
+    page = write_report(
+        tmp_path / "r.html",
+        title="t",
+        names=list("tuvwxyz"),
+        labels=labels,
+        thumbnails=[None] * 7,
+        scores=evaluate(distances, labels),
+        distances=distances,
+    ).read_text(encoding="utf-8")
+    assert "Answered worst" not in page
+    assert "Every query was answered perfectly" in page
+    assert 'class="wrong"' not in page
+    [e] = re.findall(r'([\d.]+)<small> %</small><small class="most">of ([\d.]+) %', page)
+    assert e[0] == e[1]
+
+
+def test_answers_shown_are_few(tmp_path: Path) -> None:
+    """An imperfect query shows two answers more than its class has others, and is not called 100 %."""
+    labels = ["a"] * 2 + ["b"] * 6
+    position = np.array([0.0, 5, 4, 10, 11, 12, 13, 14])
+    distances = np.abs(position[:, None] - position)
+    page = write_report(
+        tmp_path / "r.html",
+        title="t",
+        names=list("stuvwxyz"),
+        labels=labels,
+        thumbnails=[None] * 8,
+        distances=distances,
+    ).read_text(encoding="utf-8")
+    worst = page[page.index("Answered worst") : page.index("Answered best")]
+    for query in worst.split('<div class="query">')[1:]:
+        others = 1 if "class a" in query else 5
+        assert query.count("<li") == min(others + 2, 7)
+        assert "<small>100 %" not in query

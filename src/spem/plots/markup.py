@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
 from html import escape
 from typing import TYPE_CHECKING
@@ -26,6 +27,19 @@ def text(value: object) -> str:
     '&lt;b&gt; &amp; &quot;c&quot;'
     """
     return escape(str(value), quote=True)
+
+
+def natural(value: object) -> tuple[list[tuple[int, int, str]], str]:
+    """Return a key that sorts numbers within words by their value.
+
+    Examples
+    --------
+    >>> sorted(["11", "1", "20", "ant 10", "ant 9"], key=natural)
+    ['1', '11', '20', 'ant 9', 'ant 10']
+    """
+    words = str(value)
+    pieces = [(0, int(p), "") if p.isdecimal() else (1, 0, p) for p in re.split(r"(\d+)", words) if p]
+    return pieces, words
 
 
 def number(value: float) -> str:

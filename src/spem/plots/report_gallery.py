@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from spem.plots.markup import data_uri, section, text
+from spem.plots.markup import data_uri, natural, section, text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -93,7 +93,7 @@ def shapes_section(gallery: Gallery) -> str:
         members.setdefault(label, []).append(i)
     most = n if n <= GALLERY_SHAPES else max(1, GALLERY_SHAPES // max(1, len(members)))
     groups = []
-    for label in sorted(members)[:GALLERY_SHAPES]:
+    for label in sorted(members, key=natural)[:GALLERY_SHAPES]:
         chosen = members[label][:most]
         rest = len(members[label]) - len(chosen)
         more = f'<p class="note">and {rest} more</p>' if rest else ""

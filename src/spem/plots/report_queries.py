@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
 N_QUERIES = 6
 N_ANSWERS = 8
+# Answers of imperfect queries shown beyond as many as their class has: what comes later says little.
+FURTHER_ANSWERS = 2
+PERFECT = 1 - 1e-9
+PRAISE = "<p>Every query was answered perfectly: all of its class came first.</p>"
 QUERIES_OF_A_CLASS = 2
 
 
@@ -36,9 +40,10 @@ def queries_section(gallery: Gallery, distances: NDArray[np.float64] | None) -> 
     quality, answers = average_precision(distances, gallery.labels), rank_others(distances)
     order = [int(i) for i in np.argsort(quality, kind="stable") if np.isfinite(quality[i])]
     n_each = min(N_QUERIES, max(1, len(order) // 2))
+    imperfect = [i for i in order if quality[i] < PERFECT]
     worst, best = (
         [_query(gallery, answers[i], labels, i, quality[i]) for i in _varied(ranked, labels)[:n_each]]
-        for ranked in (order, order[::-1])
+        for ranked in (imperfect, order[::-1])
     )
     legend = (
         '<p class="note">✓ same class as the query, ✗ another class. Ordered by average precision, the'
@@ -47,7 +52,7 @@ def queries_section(gallery: Gallery, distances: NDArray[np.float64] | None) -> 
     return section(
         "Queries",
         legend,
-        f"<h3>Answered worst</h3>\n{''.join(worst)}",
+        f"<h3>Answered worst</h3>\n{''.join(worst)}" if worst else PRAISE,
         f"<h3>Answered best</h3>\n{''.join(best)}" if len(order) > 1 else "",
     )
 
@@ -68,13 +73,21 @@ def _query(
 ) -> str:
     """One query and its first answers, right and wrong ones told apart by sign and frame."""
     answers = []
-    for i in ranked[:N_ANSWERS]:
+    relevant = int(np.count_nonzero(labels == labels[query])) - 1
+    further = FURTHER_ANSWERS if quality < PERFECT else 0
+    for i in ranked[: min(N_ANSWERS, relevant + further)]:
         right = labels[i] == labels[query]
         kind, sign, said = ("right", "✓", "same class") if right else ("wrong", "✗", "another class")
         mark = f'<span class="mark" role="img" aria-label="{said}">{sign}</span> '
         answers.append(f'<li class="{kind}">{gallery.tile(int(i), mark)}</li>')
     return (
-        f'<div class="query"><div class="asked">{gallery.tile(query)}'
-        f"<p>{text(labels[query])}<br><small>{100 * quality:.0f} %</small></p></div>"
+        f'<div class="query"><div class="asked"><p>class {text(labels[query])}</p>{gallery.tile(query)}'
+        f"<p><small>{_share(quality)}</small></p></div>"
         f"<ol>{''.join(answers)}</ol></div>\n"
     )
+
+
+def _share(quality: float) -> str:
+    """Average precision as a percentage; 100 % is said of perfect ones only."""
+    percent = 100 * quality
+    return f"{percent:.0f} %" if quality >= PERFECT else f"{min(percent, 99.9):.3g} %"
