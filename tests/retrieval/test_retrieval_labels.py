@@ -43,9 +43,22 @@ def test_princeton_classifications_are_read(write):
     assert read_labels(write(CLA, "test.txt")) == read_labels(write(CLA, "test.cla"))
 
 
+def test_classes_of_one_name_are_told_apart_by_their_parents(write):
+    """Other animals and other cars are two classes; a name that one parent has stays as it is."""
+    classes = "animal 0 0\ncar 0 0\nother animal 1\n1\nother car 2\n2\n3\nother 0 1\n4\ncat animal 1\n5\n"
+    text = f"PSB 1\n6 5\n{classes}"
+    assert read_labels(write(text, "test.cla")) == {
+        "1": "animal/other", "2": "car/other", "3": "car/other", "4": "other", "5": "cat"
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (
+            'a.png,"cat' + 140_000 * "\nb.png,dog",
+            r"not a table of 'file,label' \(field larger .*a quote that",
+        ),
         ("file,label\na.png,cat\nb.png\n", r"labels.csv, line 3: expected 'file,label', got 'b.png'"),
         ("a.png,cat\nb.png,\n", r"line 2: expected 'file,label', got 'b.png,'"),
         ("name,label\na.png,cat\n", r"line 1: expected columns 'file' and 'label', got 'name,label'"),
@@ -81,6 +94,18 @@ def test_shapes_are_matched_by_name_stem_and_number(tmp_path):
     names.remove("m12")
     names[-2:] = ["T7"]
     assert match_labels(names, labels) == ["cat", "cat", "dog", "dog", "ant", "man", "bird"]
+
+
+def test_shapes_of_one_file_name_are_matched_by_their_folders(tmp_path):
+    """The longest end of a path that fits decides, with or without the ending of the name."""
+    names = ["dup/a/x.png", tmp_path / "dup" / "b" / "x.png", "dup/c/x.png"]
+    labels = {"a/x.png": "A", "b/x": "B", "x.png": "C"}
+    assert match_labels(names, labels) == ["A", "B", "C"]
+    assert unused_labels(names[:2], labels) == ["x.png"]
+    assert match_labels(["x.png"], labels) == ["C"]
+    assert match_labels(["a/x.png", "b/x.png"], {"up/a/x.png": "A", "./up/b/x.png": "B"}) == ["A", "B"]
+    with pytest.raises(LabelError, match=r"c/x\.png: several labels fit this name"):
+        match_labels(["c/x.png"], {"a/x.png": "A", "b/x.png": "B"})
 
 
 def test_a_name_that_several_labels_fit_is_refused():

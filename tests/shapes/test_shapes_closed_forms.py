@@ -103,3 +103,9 @@ def test_bad_arguments_are_refused():
         shell_field([[0.7]], 0.5, 1.0, 1.0)
     with pytest.raises(ParameterError, match=r"shape \(n, d\)"):
         ball_field([0.0, 1.0], 1.0, 1.0)
+
+
+def test_points_of_an_interval_have_one_coordinate():
+    """Points of the plane are not taken for twice as many on the line."""
+    with pytest.raises(ParameterError, match=r"points of an interval must be .* not \(3, 2\)"):
+        interval_field(np.zeros((3, 2)), 1.0, 1.0)

@@ -155,3 +155,26 @@ def test_bad_sizes_are_refused():
         synthetic.ball(1.0, 1e-4)
     with pytest.raises(ShapeError, match="no voxel centre lies inside"):
         synthetic.interval(0.1, 1.0, offset=0.5)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: synthetic.box((), 0.1), r"box: lengths=\(\): expected one side length per axis"),
+        (lambda: synthetic.box(((1, 2), (3, 4)), 0.1), r"box: lengths=.*: expected one side length per axis"),
+        (
+            lambda: synthetic.disk(5, 1, offset=float("nan")),
+            r"disk: offset=nan: expected one finite number, or 2",
+        ),
+        (lambda: synthetic.disk(5, 1, offset=(0, 0, 0)), r"disk: offset=\(0, 0, 0\): expected one finite"),
+        (lambda: synthetic.disk(5, 1, offset="far"), r"disk: offset=far: expected one finite number"),
+        (lambda: synthetic.disk("wide", 1), r"disk: radius must be positive and finite, not wide"),
+        (lambda: synthetic.n_ball(1, 0.1, 2.5), r"2.5-ball: ndim must be a whole number, not 2.5"),
+        (lambda: synthetic.star_polygon(9.5), r"star 9.5/4: n must be a whole number, not 9.5"),
+        (lambda: synthetic.implicit_shape(len, (), (), 0.1), r"shape: the box from \[\] to \[\] is empty"),
+    ],
+)
+def test_arguments_out_of_range_are_refused_by_name(make, message):
+    """What NumPy would trip over is named in one line."""
+    with pytest.raises(ParameterError, match=message):
+        make()

@@ -96,6 +96,8 @@ class PrecisionRecall:
 def evaluate(distances: ArrayLike, labels: Sequence[Hashable]) -> Scores:
     """Score the ranking that distances give, each shape being a query in turn.
 
+    A query has n - 1 answers, so with fewer than 33 shapes E is of all of these rather than of 32.
+
     Parameters
     ----------
     distances

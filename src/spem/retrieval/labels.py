@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import csv
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path, PurePath
+from typing import TypeAlias
 
 from spem.errors import LabelError, ReadError
 
 # A message names this many of the names it is about.
 NAMED = 3
+# The end of a path: folders, file name, and whether that is the whole path; None for a name without ending.
+_End: TypeAlias = tuple[tuple[str, ...], str, bool | None]
 
 
 def read_labels(path: str | Path) -> dict[str, str]:
@@ -18,7 +20,8 @@ def read_labels(path: str | Path) -> dict[str, str]:
 
     Two forms are read. A table of comma-separated values with columns ``file`` and ``label``, in
     any order and among any others, or two columns in that order without a header. A Princeton
-    Shape Benchmark classification (``.cla``), whose identifiers become the files.
+    Shape Benchmark classification (``.cla``), whose identifiers become the files and whose classes
+    become the labels, as "parent/class" where classes of several parents have one name.
 
     Parameters
     ----------
@@ -73,8 +76,9 @@ def read_labels(path: str | Path) -> dict[str, str]:
 def match_labels(names: Sequence[str | Path], labels: Mapping[str, str]) -> list[str]:
     """Return the label of every shape.
 
-    A shape is looked up as it is named, then by file name, then by file name without ending, then
-    by the number its name ends in where the labels are for bare numbers (``T12.obj`` is ``12``).
+    A shape has the label of the file that shares the longest end of its path, file name and as many
+    folders as there are, with or without the ending of the name. Else it is looked up by the number its
+    name ends in where the labels are for bare numbers (``T12.obj`` is ``12``).
 
     Parameters
     ----------
@@ -96,6 +100,8 @@ def match_labels(names: Sequence[str | Path], labels: Mapping[str, str]) -> list
     Examples
     --------
     >>> match_labels(["animals/tom.png", "T12.obj"], {"tom": "cat", "12": "dog"})
+    ['cat', 'dog']
+    >>> match_labels(["pets/a/1.png", "pets/b/1.png"], {"a/1.png": "cat", "b/1.png": "dog"})
     ['cat', 'dog']
     """
     keys = _resolve(names, labels)
@@ -130,15 +136,13 @@ def unused_labels(names: Sequence[str | Path], labels: Mapping[str, str]) -> lis
 
 def _resolve(names: Sequence[str | Path], labels: Mapping[str, str]) -> list[str | None]:
     """Find the key of every name among the labels, or None."""
-    by_name = _unambiguous(labels, ((PurePath(key).name, key) for key in labels))
-    by_stem = _unambiguous(labels, ((PurePath(key).stem, key) for key in labels))
+    by_end = _ends(labels)
     by_number = {int(key): key for key in labels if key.isascii() and key.isdigit()}
     clashes: dict[int, str] = {}
     keys: list[str | None] = []
     for name in names:
         path = PurePath(name)
-        key = next((k for k in (str(name), path.name) if k in labels), None)
-        key = key or by_name.get(path.name) or by_stem.get(path.stem)
+        key = str(name) if str(name) in labels else _by_end(path, by_end)
         digits = _number(path.stem)
         if key is None and digits in by_number:
             stem = path.stem.rstrip("0123456789")
@@ -154,14 +158,29 @@ def _resolve(names: Sequence[str | Path], labels: Mapping[str, str]) -> list[str
     return keys
 
 
-def _unambiguous(labels: Mapping[str, str], pairs: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """Map short names to keys; to the empty string where keys of different labels share one."""
-    short: dict[str, str] = {}
-    for name, key in pairs:
-        known = short.setdefault(name, key)
-        if known and labels[known] != labels[key]:
-            short[name] = ""
-    return short
+def _by_end(path: PurePath, by_end: Mapping[_End, str]) -> str | None:
+    """Find the key that shares the longest end of a path; empty if several do, None if none does."""
+    for start in range(len(path.parts)):
+        folder = path.parts[start:-1]
+        ends = ((folder, path.name, True), (folder, path.name, False), (folder, path.stem, None))
+        found = next((by_end[end] for end in ends if end in by_end), None)
+        if found is not None:
+            return found
+    return None
+
+
+def _ends(labels: Mapping[str, str]) -> dict[_End, str]:
+    """Map the ends of keys to keys; to the empty string where keys of different labels share one."""
+    ends: dict[_End, str] = {}
+    for key in labels:
+        path = PurePath(key)
+        for start in range(len(path.parts)):
+            folder = path.parts[start:-1]
+            for end in ((folder, path.name, start == 0), (folder, path.stem, None)):
+                known = ends.setdefault(end, key)
+                if known and labels[known] != labels[key]:
+                    ends[end] = ""
+    return ends
 
 
 def _number(stem: str) -> int:
@@ -172,16 +191,12 @@ def _number(stem: str) -> int:
 
 def _table(source: Path, lines: list[str]) -> list[tuple[int, str, str]]:
     """Parse comma-separated lines into (line number, file, label)."""
-    rows = csv.reader(lines)
     file_column, label_column, width = 0, 1, 2
     pairs: list[tuple[int, str, str]] = []
     first = True
-    for row in rows:
-        cells = [cell.strip() for cell in row]
-        if not any(cells):
-            continue
-        header, where = [cell.lower() for cell in cells], f"{source}, line {rows.line_num}"
-        got = repr(lines[rows.line_num - 1])
+    for number, cells in _rows(source, lines):
+        header, where = [cell.lower() for cell in cells], f"{source}, line {number}"
+        got = repr(lines[number - 1])
         if first and {"file", "label"} & set(header):
             if not {"file", "label"} <= set(header):
                 msg = f"{where}: expected columns 'file' and 'label', got {got}"
@@ -191,9 +206,23 @@ def _table(source: Path, lines: list[str]) -> list[tuple[int, str, str]]:
             msg = f"{where}: expected 'file,label', got {got}"
             raise LabelError(msg)
         else:
-            pairs.append((rows.line_num, cells[file_column], cells[label_column]))
+            pairs.append((number, cells[file_column], cells[label_column]))
         first = False
     return pairs
+
+
+def _rows(source: Path, lines: list[str]) -> Iterator[tuple[int, list[str]]]:
+    """Yield the line number and the cells of the rows that are not blank."""
+    rows = csv.reader(lines)
+    try:
+        for row in rows:
+            cells = [cell.strip() for cell in row]
+            if any(cells):
+                yield rows.line_num, cells
+    except csv.Error as error:
+        where = f"{source}, line {rows.line_num}"
+        msg = f"{where}: not a table of 'file,label' ({error}); look for a quote that is not closed"
+        raise LabelError(msg) from error
 
 
 def _is_classification(source: Path, lines: list[str]) -> bool:
@@ -208,30 +237,40 @@ def _classification(source: Path, lines: list[str]) -> list[tuple[int, str, str]
         msg = f"{source}, line 1: expected 'PSB 1' and then the numbers of classes and models"
         raise LabelError(msg)
     n_classes, n_models = map(int, content[1][1])
-    pairs: list[tuple[int, str, str]] = []
-    names: Counter[str] = Counter()
-    label, left = "", 0
+    models: list[tuple[int, str, str, str]] = []
+    found, label, parent, left = 0, "", "", 0
     for number, words in content[2:]:
         if left:
             if len(words) != 1:
                 wanted = f"one of {left} more models of {label}"
                 msg = f"{source}, line {number}: expected {wanted}, got {' '.join(words)!r}"
                 raise LabelError(msg)
-            pairs.append((number, words[0], label))
+            models.append((number, words[0], parent, label))
             left -= 1
         elif len(words) == 3 and _counts(words[2:], 1):
-            label, left = words[0], int(words[2])
-            names[label] += 1
+            label, parent, left = words[0], words[1], int(words[2])
+            found += 1
         else:
             msg = f"{source}, line {number}: expected 'class parent number', got {' '.join(words)!r}"
             raise LabelError(msg)
-    if left or len(pairs) != n_models or names.total() != n_classes:
+    if left or len(models) != n_models or found != n_classes:
         msg = (
-            f"{source}: {names.total()} classes and {len(pairs)} models found, "
+            f"{source}: {found} classes and {len(models)} models found, "
             f"{n_classes} and {n_models} announced on line {content[1][0]}; the file is cut short or edited"
         )
         raise LabelError(msg)
-    return pairs
+    return _qualified(models)
+
+
+def _qualified(models: list[tuple[int, str, str, str]]) -> list[tuple[int, str, str]]:
+    """Put the parent before the names of classes that classes of several parents have."""
+    parents: dict[str, set[str]] = {}
+    for _, _, parent, label in models:
+        parents.setdefault(label, set()).add(parent)
+    return [
+        (number, model, f"{parent}/{label}" if len(parents[label]) > 1 and parent != "0" else label)
+        for number, model, parent, label in models
+    ]
 
 
 def _counts(words: list[str], number: int) -> bool:

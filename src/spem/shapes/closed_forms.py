@@ -33,12 +33,21 @@ def interval_field(points: ArrayLike, length: float, rho: ArrayLike) -> NDArray[
     numpy.ndarray
         ``(n, *rho.shape)``
 
+    Raises
+    ------
+    ParameterError
+        If the length or a ρ is not positive, or the points are neither ``(n,)`` nor ``(n, 1)``.
+
     Examples
     --------
     >>> interval_field([0.0, 1.0], 2.0, 1.0).round(4).tolist()
     [0.6481, 1.0]
     """
-    return ball_field(np.asarray(points, float).reshape(-1, 1), length / 2, rho)
+    x = np.asarray(points, float)
+    if x.ndim != 1 and x.shape[1:] != (1,):
+        msg = f"points of an interval must be an array of shape (n,) or (n, 1), not {x.shape}"
+        raise ParameterError(msg)
+    return ball_field(x.reshape(-1, 1), length / 2, rho)
 
 
 def ball_field(points: ArrayLike, radius: float, rho: ArrayLike) -> NDArray[np.float64]:

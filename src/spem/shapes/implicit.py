@@ -65,7 +65,7 @@ def implicit_shape(
     Raises
     ------
     ParameterError
-        If the spacing is not positive or the box is empty.
+        If the spacing is not positive, the offset is not finite or the box is empty.
     ShapeError
         If no voxel centre lies inside.
     SizeError
@@ -143,16 +143,28 @@ def _frame(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, ...]]:
     """Return the first centre, the spacing and the number of voxels of a grid over a box."""
     lower, upper = np.atleast_1d(np.asarray(low, float)), np.atleast_1d(np.asarray(high, float))
-    step = np.array(spacing_per_axis(spacing, lower.size, name))
-    if lower.shape != upper.shape or not np.all(upper > lower):
+    if lower.shape != upper.shape or lower.ndim != 1 or not lower.size or not np.all(upper > lower):
         msg = f"{name}: the box from {lower.tolist()} to {upper.tolist()} is empty"
         raise ParameterError(msg)
+    step = np.array(spacing_per_axis(spacing, lower.size, name))
     # One layer outside the box on either side keeps the shape off the border whatever the offset.
-    shift = np.broadcast_to(np.asarray(offset, float), lower.shape) % 1.0
+    shift = _offsets(offset, lower.size, name) % 1.0
     start = lower + (shift - 1) * step
     counts = tuple(int(c) for c in np.minimum(np.ceil((upper - start) / step) + 2, _MOST))
     check_size(counts, _BYTES_PER_VOXEL, None, name)
     return start, step, counts
+
+
+def _offsets(offset: float | tuple[float, ...], ndim: int, name: str) -> NDArray[np.float64]:
+    """Return one checked shift of the grid per axis, in edges."""
+    try:
+        shift = np.asarray(offset, np.float64)
+    except (TypeError, ValueError):
+        shift = np.full(1, np.nan)
+    if shift.shape not in ((), (ndim,)) or not np.isfinite(shift).all():
+        msg = f"{name}: offset={offset}: expected one finite number, or {ndim} of them, one per axis"
+        raise ParameterError(msg)
+    return np.broadcast_to(shift, (ndim,))
 
 
 def _cut(

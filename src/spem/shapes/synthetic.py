@@ -6,6 +6,8 @@ that a convergence study need not be lucky with the position of its voxel centre
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -68,12 +70,20 @@ def box(
     offset
         Shift of the grid, in edges.
 
+    Raises
+    ------
+    ParameterError
+        If there is no side length, or one is not positive.
+
     Examples
     --------
     >>> box((1.0, 2.0), 0.25, offset=0.5)
     Shape('box', 2-D, 32 nodes, grid 6 x 10, spacing 0.25 x 0.25)
     """
-    half = np.asarray(lengths, float) / 2
+    half = np.atleast_1d(np.asarray(lengths, float)) / 2
+    if half.ndim != 1 or not half.size:
+        msg = f"{name}: lengths={lengths}: expected one side length per axis, of one axis or more"
+        raise ParameterError(msg)
     _check_positive(name, lengths=float(half.min()))
     return implicit_shape(
         lambda x: np.asarray((half - np.abs(x)).min(axis=1)), -half, half, spacing, name=name, offset=offset
@@ -150,7 +160,8 @@ def n_ball(
     """
     name = name or f"{ndim}-ball"
     _check_positive(name, radius=radius, ndim=ndim)
-    corner = np.full(ndim, float(radius))
+    _check_whole(name, ndim=ndim)
+    corner = np.full(int(ndim), float(radius))
     return implicit_shape(
         lambda x: np.asarray(radius - _norm(x)), -corner, corner, spacing, name=name, offset=offset
     )
@@ -225,7 +236,7 @@ def star_polygon(
     Raises
     ------
     ParameterError
-        If there are too few vertices.
+        If there are too few vertices, or no whole number of them.
 
     Examples
     --------
@@ -234,6 +245,7 @@ def star_polygon(
     """
     name = f"star {n}/{skip}"
     _check_positive(name, radius=radius, skip=skip)
+    _check_whole(name, n=n, skip=skip)
     if n <= 2 * skip:
         msg = f"{name}: n must be above 2 * skip = {2 * skip}, not {n}"
         raise ParameterError(msg)
@@ -274,9 +286,17 @@ def _norm(x: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.sqrt(np.einsum("nd,nd->n", x, x)))
 
 
-def _check_positive(name: str, **sizes: float) -> None:
+def _check_positive(name: str, **sizes: Any) -> None:
     """Refuse sizes that are not positive."""
     for what, size in sizes.items():
-        if not 0 < size < np.inf:
+        if not isinstance(size, (int, float, np.integer, np.floating)) or not 0 < size < np.inf:
             msg = f"{name}: {what} must be positive and finite, not {size}"
+            raise ParameterError(msg)
+
+
+def _check_whole(name: str, **counts: float) -> None:
+    """Refuse counts that are not whole."""
+    for what, count in counts.items():
+        if not float(count).is_integer():
+            msg = f"{name}: {what} must be a whole number, not {count}"
             raise ParameterError(msg)
