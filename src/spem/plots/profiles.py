@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from spem.errors import ParameterError
 from spem.plots.camera import Camera, principal_view
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 PICTURE_PIXELS = (480, 480)
 # A range of ρ over more than this ratio is shown on a logarithmic axis.
 LOGARITHMIC_RATIO = 20.0
+LINEAR_TICKS = 5
 
 
 def draw_profiles(
@@ -135,8 +137,8 @@ def _curves(
             color=COLOURS[j % len(COLOURS)],
             linestyle=DASHES[j // len(COLOURS) % len(DASHES)],
             marker=MARKERS[j % len(MARKERS)],
-            # One marker a curve, each elsewhere: curves meet at the ends.
-            markevery=[(2 * j + 1) * len(rho) // (2 * values.shape[1])],
+            # One marker a curve, each elsewhere and away from the ends, where curves and axes meet.
+            markevery=[round((len(rho) - 1) * (0.25 + 0.6 * (j + 0.5) / values.shape[1]))],
             markersize=4.5,
             linewidth=1.4,
             label=names[j] if names else "_",
@@ -145,6 +147,8 @@ def _curves(
     ]
     if rho.size and rho.max() > LOGARITHMIC_RATIO * rho.min():
         length_axis(ax)
+    else:
+        ax.xaxis.set_major_locator(MaxNLocator(LINEAR_TICKS))
     return lines
 
 
