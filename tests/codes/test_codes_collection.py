@@ -223,6 +223,22 @@ def test_label_volume_gives_a_shape_a_label(tmp_path: Path) -> None:
         encode_file(tmp_path / "teeth.npy", codes.model)
 
 
+def test_other_dimensions_are_failures(folder: Path, tmp_path: Path) -> None:
+    """The commonest dimension of a collection is that of its model; a stray shape of another one fails."""
+    np.save(folder / "a_ball.npy", np.ones((9, 9, 9), bool))
+    codes = encode_collection(find_files([folder]), SETTINGS)
+    [failure] = codes.failures
+    assert (failure.path, codes.model.ndim, len(codes)) == (str(folder / "a_ball.npy"), 2, 6)
+    assert failure.reason == "a 3-D shape among 2-D ones, which are more; encode them apart"
+    codes.save(tmp_path / "c.spem")
+    model = Codes.load(tmp_path / "c.spem").model
+    assert (model.ndim, model.digest) == (2, codes.model.digest)
+    with pytest.raises(ModelError, match=r"a_ball\.npy: a 3-D shape, but the vocabulary is of 2-D ones"):
+        encode_file(folder / "a_ball.npy", model)
+    with pytest.raises(ReadError, match="a 3-D shape, but the vocabulary is of 2-D ones"):
+        encode_collection([folder / "a_ball.npy"], model=model)
+
+
 def test_model_of_other_settings_is_refused(folder: Path) -> None:
     """Settings that contradict the model are named."""
     codes = encode_collection(find_files([folder]), SETTINGS)

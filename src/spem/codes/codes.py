@@ -139,7 +139,7 @@ class Codes:
             "paths": list(self.paths),
             "hashes": list(self.hashes),
             "failures": [[failure.path, failure.reason] for failure in self.failures],
-            "settings": self.model.settings.to_json(),
+            **self.model.to_header(),
         }
         write_container(path, "codes", header, {"vectors": self.vectors, **self.model.to_arrays("model.")})
 
@@ -155,7 +155,7 @@ class Codes:
             When it was made by another version of the method.
         """
         header, arrays = read_container(path, "codes")
-        model = Model.from_arrays(header.get("settings", {}), arrays, str(path), "model.")
+        model = Model.from_parts(header, arrays, str(path), "model.")
         try:
             names, paths, hashes = (tuple(header[key]) for key in ("names", "paths", "hashes"))
             failures = tuple(Failure(*entry) for entry in header["failures"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -19,7 +20,7 @@ from spem.codes.listing import Listing
 from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.codes.sources import Source, as_source, read_shapes, source_name, source_path
-from spem.codes.work import Entry, Work
+from spem.codes.work import Entry, Work, dimension
 from spem.codes.workers import one_line, run_all
 from spem.errors import ModelError, ParameterError, ReadError, ShapeError, SpemError
 from spem.shapes.shape import Shape
@@ -104,8 +105,9 @@ def encode_collection(
         wanted = {key: source for key, source in listing.first.items() if key not in reused}
         # One process may take all cores for a large shape; of several each has one.
         task = _Task(folder, chosen, model, threads=None if n_jobs == 1 else 1)
-        _compute(wanted, task, n_jobs, listing, progress or (lambda *_: None))
-        fitted = model or _fit(folder, [key for key in wanted if key not in listing.broken], chosen, listing)
+        ndim_of = _compute(wanted, task, n_jobs, listing, progress or (lambda *_: None))
+        whole = {key: ndim_of[key] for key in wanted if key not in listing.broken}
+        fitted = model or _fit(folder, whole, chosen, listing)
         return _assemble(listing, folder, reused, fitted, progress or (lambda *_: None))
 
 
@@ -189,9 +191,11 @@ class _Task:
     model: Model | None
     threads: int | None
 
-    def __call__(self, item: tuple[str, Source]) -> None:
+    def __call__(self, item: tuple[str, Source]) -> int:
         key, source = item
-        self.folder.save(key, _entries(source, self.settings, self.model, self.threads))
+        entries = _entries(source, self.settings, self.model, self.threads)
+        self.folder.save(key, entries)
+        return dimension(entries)
 
 
 def _entries(
@@ -204,40 +208,63 @@ def _entries(
             entries.append(Entry(suffix, one_line(shape)))
             continue
         try:
+            if model is not None:
+                model.require_ndim(shape.ndim, source_path(source) + suffix)
             bands = node_features(sweep_bands(shape, settings, threads), settings)
         except SpemError as error:
             if not suffix:
                 raise
             entries.append(Entry(suffix, one_line(error)))
             continue
-        entries.append(Entry(suffix, arrays=bands if model is None else (model.encode(bands, shape.name),)))
+        arrays = bands if model is None else (model.encode(bands, shape.name),)
+        entries.append(Entry(suffix, ndim=shape.ndim, arrays=arrays))
     return entries
 
 
 def _compute(
     wanted: dict[str, Source], task: _Task, n_jobs: int, listing: Listing, progress: Progress
-) -> None:
-    """Bring the work folder up to date; files that fail are noted with their reason."""
-    todo = [(key, source) for key, source in wanted.items() if not task.folder.done(key)]
+) -> dict[str, int]:
+    """Bring the work folder up to date and return the dimension of each source; those that fail are noted."""
+    found = {key: task.folder.dimension(key) for key in wanted}
+    ndim_of = {key: ndim for key, ndim in found.items() if ndim is not None}
+    todo = [(key, source) for key, source in wanted.items() if key not in ndim_of]
     done = len(wanted) - len(todo)
     progress("fields", done, len(wanted))
-    for (key, source), _, reason in run_all(task, todo, n_jobs):
+    for (key, source), ndim, reason in run_all(task, todo, n_jobs):
         done += 1
         if reason:
             listing.fail(source, reason, key)
+        ndim_of[key] = ndim or 0
         progress("fields", done, len(wanted))
+    return ndim_of
 
 
-def _fit(folder: Work, keys: list[str], settings: Settings, listing: Listing) -> Model:
+def _fit(folder: Work, ndim_of: dict[str, int], settings: Settings, listing: Listing) -> Model:
     """Learn a vocabulary from a sample of the sources, chosen and ordered by their content."""
-    if not any(entry.arrays for key in keys for entry in folder.load(key)):
-        for key in keys:
+    if not any(ndim_of.values()):
+        for key in ndim_of:
             for entry in folder.load(key):
                 listing.fail(listing.first[key], _label_reason(entry))
         raise _nothing(listing)
-    ranked = sorted(keys, key=lambda key: hashlib.sha256(f"{settings.seed} {key}".encode()).digest())
+    ndim = _one_dimension(ndim_of, listing)
+    ranked = sorted(
+        (key for key in ndim_of if ndim_of[key] == ndim),
+        key=lambda key: hashlib.sha256(f"{settings.seed} {key}".encode()).digest(),
+    )
     with threadpool_limits(1):
-        return Model.fit(settings, folder.features(ranked, TRAINING_SHAPES))
+        return Model.fit(settings, folder.features(ranked, TRAINING_SHAPES), ndim)
+
+
+def _one_dimension(ndim_of: dict[str, int], listing: Listing) -> int:
+    """Return the commonest dimension; sources of others fail, since their codes cannot be compared."""
+    counts = Counter(ndim for ndim in ndim_of.values() if ndim)
+    # of equally common ones the lowest, so that the order of the sources does not matter
+    common = min(counts, key=lambda ndim: (-counts[ndim], ndim))
+    for key, ndim in ndim_of.items():
+        if ndim not in (0, common):
+            reason = f"a {ndim}-D shape among {common}-D ones, which are more; encode them apart"
+            listing.fail(listing.first[key], reason, key)
+    return common
 
 
 def _assemble(
@@ -293,7 +320,7 @@ def _reusable(known: Codes | None) -> dict[str, list[Entry]]:
     for name, path, key, vector in zip(known.names, known.paths, known.hashes, known.vectors, strict=True):
         if first.setdefault(key, path) == path:
             suffix = name.removeprefix(source_name(Path(path)))
-            rows.setdefault(key, []).append(Entry(suffix, arrays=(vector,)))
+            rows.setdefault(key, []).append(Entry(suffix, ndim=known.model.ndim or 0, arrays=(vector,)))
     return rows
 
 

@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from spem.codes.arguments import whole_number
 from spem.codes.bands import as_bands
 from spem.codes.container import content_hash, read_container, write_container
 from spem.codes.normalise import Normalisation
@@ -34,12 +35,16 @@ class Model:
     spreads
         For each band ``(n_centers, n_maps)`` mean squared difference of training nodes from their
         centre; none with settings of one moment.
+    ndim
+        Dimension of the shapes that it was learnt from, the only ones it codes; None where it was
+        learnt from maps of unknown origin, and nothing is checked.
     """
 
     settings: Settings
     normalisations: tuple[Normalisation, ...]
     centers: tuple[NDArray[np.float32], ...]
     spreads: tuple[NDArray[np.float32], ...] = ()
+    ndim: int | None = None
 
     def __post_init__(self) -> None:
         s = self.settings
@@ -49,9 +54,11 @@ class Model:
         if shapes != expected:
             msg = f"a model of {n_bands} bands, {s.n_centers} centres and {s.n_maps} maps got arrays {shapes}"
             raise ModelError(msg)
+        if self.ndim is not None:
+            object.__setattr__(self, "ndim", whole_number("ndim", self.ndim))
 
     @classmethod
-    def fit(cls, settings: Settings, shapes: Iterable[Any]) -> Self:
+    def fit(cls, settings: Settings, shapes: Iterable[Any], ndim: int | None = None) -> Self:
         """Learn normalisations and vocabularies from the maps of shapes.
 
         Parameters
@@ -61,6 +68,8 @@ class Model:
         shapes
             For each shape a tuple with the ``(n_nodes, n_maps)`` maps of each band; a generator
             is read once.
+        ndim
+            Dimension of the shapes, where it is known.
 
         Examples
         --------
@@ -79,7 +88,7 @@ class Model:
         ).fit(shapes)
         centers = (words.cluster_centers_.astype(np.float32) for words in learner.vocabularies_)
         spreads = (spread.astype(np.float32) for spread in learner.spreads_ * (settings.moments - 1))
-        return cls(settings, tuple(learner.normalisations_), tuple(centers), tuple(spreads))
+        return cls(settings, tuple(learner.normalisations_), tuple(centers), tuple(spreads), ndim)
 
     @property
     def n_code(self) -> int:
@@ -89,7 +98,26 @@ class Model:
     @cached_property
     def digest(self) -> str:
         """Twelve hex digits that name this model: equal settings and arrays have equal digests."""
-        return content_hash({"settings": self.settings.to_json()}, self.to_arrays())[:12]
+        return content_hash(self.to_header(), self.to_arrays())[:12]
+
+    def require_ndim(self, ndim: int, name: str) -> None:
+        """Refuse a shape of another dimension than those that the model was learnt from.
+
+        Parameters
+        ----------
+        ndim
+            Dimension of the shape.
+        name
+            What to call it in the message.
+
+        Raises
+        ------
+        ModelError
+            When the dimensions differ.
+        """
+        if self.ndim is not None and ndim != self.ndim:
+            msg = f"{name}: a {ndim}-D shape, but the vocabulary is of {self.ndim}-D ones; give such a shape"
+            raise ModelError(msg)
 
     def encode(self, maps: Any, name: str = "shape") -> NDArray[np.float32]:
         """Make the code of a shape.
@@ -119,6 +147,10 @@ class Model:
         learnt = self.normalisations, self.centers, self.settings.power, self.spreads or None
         return encode(bands, *learnt).astype(np.float32)
 
+    def to_header(self) -> dict[str, Any]:
+        """Return the settings, and the dimension where it is known, for a file."""
+        return {"settings": self.settings.to_json()} | ({} if self.ndim is None else {"ndim": self.ndim})
+
     def to_arrays(self, prefix: str = "") -> dict[str, NDArray[Any]]:
         """Return the learnt arrays by name, for a file."""
         arrays: dict[str, NDArray[Any]] = {}
@@ -129,11 +161,11 @@ class Model:
         return arrays | {f"{prefix}spreads.{band}": array for band, array in enumerate(self.spreads)}
 
     @classmethod
-    def from_arrays(
-        cls, settings: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], source: str, prefix: str = ""
+    def from_parts(
+        cls, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], source: str, prefix: str = ""
     ) -> Self:
-        """Make a model of what `Settings.to_json` and `to_arrays` gave."""
-        checked = Settings.from_json(settings, source)
+        """Make a model of what `to_header` and `to_arrays` gave."""
+        checked = Settings.from_json(header.get("settings", {}), source)
         bands = range(len(checked.rho_ranges))
         try:
             normalisations = tuple(
@@ -142,14 +174,17 @@ class Model:
             )
             centers = tuple(arrays[f"{prefix}centers.{band}"] for band in bands)
             spreads = tuple(arrays[f"{prefix}spreads.{band}"] for band in bands if checked.moments == 2)
-            return cls(checked, normalisations, centers, spreads)
+            return cls(checked, normalisations, centers, spreads, header.get("ndim"))
         except KeyError as error:
             msg = f"{source}: the model lacks the array {error}; make it again"
+            raise ModelError(msg) from error
+        except ParameterError as error:
+            msg = f"{source}: the model is damaged ({error}); make it again"
             raise ModelError(msg) from error
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the model to a file, in one step."""
-        write_container(path, "model", {"settings": self.settings.to_json()}, self.to_arrays())
+        write_container(path, "model", self.to_header(), self.to_arrays())
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -163,7 +198,7 @@ class Model:
             When it was made by another version of the method.
         """
         header, arrays = read_container(path, "model")
-        return cls.from_arrays(header.get("settings", {}), arrays, str(path))
+        return cls.from_parts(header, arrays, str(path))
 
     def __repr__(self) -> str:
         s, n_bands = self.settings, len(self.centers)

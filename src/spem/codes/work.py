@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +18,8 @@ from spem.errors import ParameterError, SpemError
 
 _KIND = "work"
 _SUFFIX = ".work"
+# Raised when the layout of these files changes.
+_LAYOUT = 2
 # Length of the digest that a folder of work is named by.
 _DIGITS, _HEX = 12, set("0123456789abcdef")
 # Settings that change codes but not the features that they are made of.
@@ -34,13 +36,27 @@ class Entry:
         What tells the shape from others of its source.
     reason
         Why there is nothing, or empty.
+    ndim
+        Dimension of the shape; 0 where there is nothing.
     arrays
         Node features of each band ``(n_nodes, n_maps)``, or one code ``(n_code,)``.
     """
 
     suffix: str
     reason: str = ""
+    ndim: int = 0
     arrays: tuple[NDArray[Any], ...] = ()
+
+
+def dimension(entries: Iterable[Entry]) -> int:
+    """Return the dimension that the shapes of a source have, 0 where none gave anything.
+
+    Examples
+    --------
+    >>> dimension([Entry("-2", "too thin"), Entry("-3", ndim=3)])
+    3
+    """
+    return max((entry.ndim for entry in entries), default=0)
 
 
 @dataclass(frozen=True)
@@ -68,7 +84,11 @@ class Work:
             When the folder cannot be made.
         """
         values = {key: value for key, value in settings.to_json().items() if key not in _LATER}
-        digest = content_hash({"features": values}, {})[:_DIGITS] if model is None else model.digest
+        digest = (
+            content_hash({"features": values, "entries": _LAYOUT}, {})[:_DIGITS]
+            if model is None
+            else model.digest
+        )
         folder = root / digest
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -77,17 +97,16 @@ class Work:
             raise ParameterError(msg) from error
         return cls(folder)
 
-    def done(self, key: str) -> bool:
-        """Tell whether a source is there, whole."""
+    def dimension(self, key: str) -> int | None:
+        """Return the dimension of a source, as `dimension` does; None where it is not done."""
         try:
-            self.load(key)
+            return dimension(self.load(key))
         except SpemError:
-            return False
-        return True
+            return None
 
     def save(self, key: str, entries: list[Entry]) -> None:
         """Write what a source came to, in one step."""
-        header = {"shapes": [[entry.suffix, entry.reason, len(entry.arrays)] for entry in entries]}
+        header = {"shapes": [[e.suffix, e.reason, e.ndim, len(e.arrays)] for e in entries]}
         arrays = {f"{i}.{j}": a for i, entry in enumerate(entries) for j, a in enumerate(entry.arrays)}
         write_container(self.folder / f"{key}{_SUFFIX}", _KIND, header, arrays)
 
@@ -101,8 +120,8 @@ class Work:
         """
         header, arrays = read_container(self.folder / f"{key}{_SUFFIX}", _KIND)
         return [
-            Entry(suffix, reason, tuple(np.asarray(arrays[f"{i}.{j}"]) for j in range(count)))
-            for i, (suffix, reason, count) in enumerate(header["shapes"])
+            Entry(suffix, reason, ndim, tuple(np.asarray(arrays[f"{i}.{j}"]) for j in range(count)))
+            for i, (suffix, reason, ndim, count) in enumerate(header["shapes"])
         ]
 
     def features(self, keys: list[str], limit: int) -> Iterator[tuple[NDArray[Any], ...]]:
