@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+from PIL import Image
 
 import spem
 from spem.plots.figures import figure_fields, figure_maps
@@ -24,22 +26,31 @@ def main(folder: Path = FOLDER, *, share: float = 1.0) -> None:
 
     def save(figure: Figure, name: str) -> None:
         FigureCanvasAgg(figure)
-        figure.savefig(folder / name, dpi=110, bbox_inches="tight")
+        target = BytesIO()
+        figure.savefig(target, dpi=110)
+        # A palette makes the files a third as large.
+        Image.open(target).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(
+            folder / name, optimize=True
+        )
 
     flat = spem.creatures.creature("hand", voxels=int(9_000 * share), rng=np.random.default_rng(4))
+    flat = replace(flat, spacing=(1.0, 1.0), origin=(0.0, 0.0))  # lengths in pixels, as of an image
     solid = spem.creatures.creature("dog", ndim=3, voxels=int(40_000 * share), rng=np.random.default_rng(2))
     field = spem.sweep(flat)
-    rho = np.array([0.03, 0.06, 0.12, 0.25]) * flat.size
-    save(figure_fields(flat, field.at(rho), [f"ρ = {r:.2g}" for r in rho], columns=4), "fields.png")
+    rho = [4.0, 8.0, 16.0, 32.0]
+    titles = [f"ρ = {r:g} pixels" for r in rho]
+    save(figure_fields(flat, spem.field(flat, rho), titles, columns=4), "fields.png")
     save(figure_maps(spem.maps(field), columns=6), "maps.png")
     save(figure_maps(spem.maps(solid), columns=3), "maps-3d.png")
 
     profiles = Figure(figsize=(9, 3), layout="constrained")
     left, middle, right = profiles.subplots(1, 3)
-    depth = np.argsort(field.at(float(rho[2])))
+    depth = np.argsort(field.at(0.12 * flat.size))
     nodes = depth[(np.array([0.0, 0.35, 0.6, 0.8, 0.95]) * (flat.n_nodes - 1)).astype(int)]
     draw_profiles(field, nodes, middle, shape_ax=left)
     draw_basis(spem.maps(field, n_maps=4), right)
+    for axis in (middle, right):
+        axis.set_xlabel("ρ, pixels")
     save(profiles, "profiles.png")
     save(answers(share), "answers.png")
 
