@@ -236,6 +236,23 @@ def test_evaluate_scores(spem: Spem, folder: Path, codes: Path, tmp_path: Path) 
     assert "data:image/png" in page
 
 
+def test_report_tells_of_shapes_that_are_gone(
+    spem: Spem, folder: Path, codes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Shapes are drawn from any working directory; those that are gone are counted in one line."""
+    monkeypatch.chdir(tmp_path)
+    assert spem("encode", "shapes", "-o", "relative.spem", *QUICK).exit_code == 0
+    options = ("--labels", folder / "labels.csv", "--report", tmp_path / "report")
+    monkeypatch.chdir("/")
+    result = spem("evaluate", tmp_path / "relative.spem", *options)
+    assert (result.exit_code, result.stderr) == (0, "")
+    (folder / "long0.npy").unlink()
+    result = spem("evaluate", tmp_path / "relative.spem", *options)
+    [line] = result.stderr.splitlines()
+    assert "1 of 9 shapes could not be drawn for the report: " in line
+    assert line.endswith("long0.npy is not there")
+
+
 def test_report_shows_the_maps_of_the_codes(
     spem: Spem, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

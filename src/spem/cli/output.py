@@ -26,6 +26,17 @@ def complain(message: str) -> None:
     typer.echo(f"spem: {message}", err=True)
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, plural with s but for one.
+
+    Examples
+    --------
+    >>> counted(1, "shape"), counted(2, "shape")
+    ('1 shape', '2 shapes')
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def check_target(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
     """Make sure, before anything is computed, that a file can be written; its folder is made.
 

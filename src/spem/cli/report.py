@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from spem.cli.output import complain, counted
 from spem.codes.features import band_maps, sweep_bands
 from spem.codes.sources import read_shapes, source_name
 from spem.codes.workers import run_all
@@ -65,13 +66,15 @@ def write_collection_report(
         The file written.
     """
     pictures = _thumbnails(codes, jobs)
+    drawn = [pictures.get(key) for key in zip(codes.paths, codes.names, strict=True)]
+    _tell_missing(codes, drawn)
     shown = [classes.index(label) for label in dict.fromkeys(classes)][:MAP_PICTURES]
     return write_report(
         path,
         title=title,
         names=codes.names,
         labels=classes,
-        thumbnails=[pictures.get(key) for key in zip(codes.paths, codes.names, strict=True)],
+        thumbnails=drawn,
         map_pictures=[_map_picture(codes, row) if row in shown else None for row in range(max(shown) + 1)],
         scores=scores,
         curve=precision_recall(distances, classes),
@@ -100,6 +103,15 @@ def _thumbnails(codes: Codes, jobs: int) -> dict[tuple[str, str], bytes]:
     paths = list(dict.fromkeys(path for path in codes.paths if Path(path).is_file()))
     outcomes = run_all(draw, paths, jobs)
     return {(path, name): png for path, drawn, _ in outcomes for name, png in (drawn or {}).items()}
+
+
+def _tell_missing(codes: Codes, drawn: list[bytes | None]) -> None:
+    """Tell how many shapes have no picture, and why the first has none."""
+    missing = [path for path, png in zip(codes.paths, drawn, strict=True) if png is None]
+    if missing:
+        why = "cannot be drawn" if Path(missing[0]).is_file() else "is not there"
+        of = f"{len(missing)} of {counted(len(drawn), 'shape')}"
+        complain(f"{of} could not be drawn for the report: {missing[0]} {why}")
 
 
 def _map_picture(codes: Codes, row: int) -> bytes | None:

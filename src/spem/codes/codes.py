@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spem.codes.container import read_container, write_container
 from spem.codes.model import Model
+from spem.codes.places import found_path, stored_path
 from spem.errors import ModelError, ParameterError, ReadError
 
 
@@ -46,7 +47,7 @@ class Codes:
     names
         ``(n_shapes,)`` names for people.
     paths
-        ``(n_shapes,)`` files, as they were given.
+        ``(n_shapes,)`` files, as they were given; in a codes file relative ones start from its folder.
     hashes
         ``(n_shapes,)`` SHA-256 of each file's bytes, in hex: equal files are told by it.
     vectors
@@ -134,11 +135,12 @@ class Codes:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write codes and model to one file, in one step."""
+        folder = Path(path).parent
         header = {
             "names": list(self.names),
-            "paths": list(self.paths),
+            "paths": [stored_path(each, folder) for each in self.paths],
             "hashes": list(self.hashes),
-            "failures": [[failure.path, failure.reason] for failure in self.failures],
+            "failures": [[stored_path(each.path, folder), each.reason] for each in self.failures],
             **self.model.to_header(),
         }
         write_container(path, "codes", header, {"vectors": self.vectors, **self.model.to_arrays("model.")})
@@ -157,8 +159,10 @@ class Codes:
         header, arrays = read_container(path, "codes")
         model = Model.from_parts(header, arrays, str(path), "model.")
         try:
-            names, paths, hashes = (tuple(header[key]) for key in ("names", "paths", "hashes"))
-            failures = tuple(Failure(*entry) for entry in header["failures"])
+            names, stored, hashes = (tuple(header[key]) for key in ("names", "paths", "hashes"))
+            folder = Path(path).parent
+            paths = tuple(found_path(each, folder) for each in stored)
+            failures = tuple(Failure(found_path(each, folder), reason) for each, reason in header["failures"])
             return cls(names, paths, hashes, arrays["vectors"], model, failures)
         except (KeyError, TypeError, ParameterError) as error:
             msg = f"{path}: not whole codes ({error}); make it again"
