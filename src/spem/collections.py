@@ -15,7 +15,7 @@ from spem.errors import LabelError, ParameterError, ReadError
 from spem.retrieval.distances import correlation_distance
 from spem.retrieval.evaluation import Scores
 from spem.retrieval.evaluation import evaluate as evaluate_distances
-from spem.retrieval.labels import match_labels, read_labels
+from spem.retrieval.labels import labelled, match_labels, read_labels
 from spem.retrieval.ranking import Answer, rank
 from spem.shapes.shape import Shape
 
@@ -114,7 +114,10 @@ def search(codes: Codes | str | Path, query: str | Path | Shape, k: int | None =
 
 
 def evaluate(
-    codes: Codes | str | Path, labels: str | Path | Mapping[str, str] | Sequence[Hashable]
+    codes: Codes | str | Path,
+    labels: str | Path | Mapping[str, str] | Sequence[Hashable],
+    *,
+    ignore_unlabelled: bool = False,
 ) -> Scores:
     """Score a collection: each shape is a query in turn, those of its class are to be found.
 
@@ -123,7 +126,10 @@ def evaluate(
     codes
         Codes, or the file that holds them.
     labels
-        A labels file, a mapping of files to labels, or one label for each row of the codes.
+        A labels file, a mapping of files to labels, or one label for each row of the codes. The shapes of
+        a label volume are looked up by their names, such as ``"teeth-3"``.
+    ignore_unlabelled
+        Leave out shapes that a file or mapping has no label for.
 
     Raises
     ------
@@ -141,6 +147,8 @@ def evaluate(
     collection = codes if isinstance(codes, Codes) else Codes.load(codes)
     if isinstance(labels, (str, Path)):
         labels = read_labels(labels)
+    if ignore_unlabelled and isinstance(labels, Mapping):
+        collection = collection.take(labelled(row_keys(collection), labels))
     classes = match_labels(row_keys(collection), labels) if isinstance(labels, Mapping) else list(labels)
     if len(classes) != len(collection):
         msg = f"{len(classes)} labels for {len(collection)} shapes; give one for each row of the codes"

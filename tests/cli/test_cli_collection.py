@@ -19,6 +19,8 @@ from spem.codes.collection import encode_collection
 from spem.codes.container import read_container, write_container
 from spem.codes.settings import Settings
 from spem.codes.sources import find_files
+from spem.collections import evaluate
+from spem.errors import LabelError
 from spem.fields.rho import squared
 from spem.retrieval.evaluation import MEASURES
 
@@ -236,6 +238,28 @@ def test_evaluate_scores(spem: Spem, folder: Path, codes: Path, tmp_path: Path) 
     assert "data:image/png" in page
 
 
+def test_unlabelled_shapes_are_left_out_when_asked(
+    spem: Spem, folder: Path, codes: Path, tmp_path: Path
+) -> None:
+    """Shapes without a label stop the scoring, unless they are left out, which is told."""
+    table = folder / "labels.csv"
+    rows = table.read_text().splitlines()
+    table.write_text("\n".join(row for row in rows if not row.startswith("oval")))
+    refused = spem("evaluate", codes, "--labels", table)
+    assert refused.exit_code == 2
+    assert "3 of 9 shapes have no label" in refused.stderr
+    assert "--ignore-unlabelled" in refused.stderr
+    options = ("--labels", table, "--ignore-unlabelled", "--json", tmp_path / "s.json")
+    result = spem("evaluate", codes, *options)
+    assert result.exit_code == 0, result.stderr
+    assert result.stderr == "spem: 3 shapes without a label left out\n"
+    assert result.stdout.startswith("6 shapes in 2 classes")
+    assert result.stdout.endswith(f"wrote {tmp_path / 's.json'}\n")
+    assert evaluate(codes, table, ignore_unlabelled=True).mean()["NN"] > 80
+    with pytest.raises(LabelError, match="none of the 9 shapes has a label"):
+        evaluate(codes, {"nobody": "cat"}, ignore_unlabelled=True)
+
+
 def test_report_tells_of_shapes_that_are_gone(
     spem: Spem, folder: Path, codes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -290,7 +314,7 @@ def test_evaluate_writes_json_to_stdout(spem: Spem, folder: Path, codes: Path) -
     [
         (lambda rows: rows[:-2], 2, "2 of 9 shapes have no label"),
         (lambda rows: [*rows, "ghost.npy,ghost"], 0, "such as ghost.npy"),
-        (lambda rows: [*rows[:-1], "oval2.npy,lonely"], 0, "alone in their class"),
+        (lambda rows: [*rows[:-1], "oval2.npy,lonely"], 0, "alone in a class of one"),
         (
             lambda rows: [f"{row.split(',')[0]},c{i}" if i else row for i, row in enumerate(rows)],
             2,

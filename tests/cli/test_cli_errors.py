@@ -124,9 +124,10 @@ def test_nothing_to_write(spem: Spem, image: Path) -> None:
 
 
 def test_four_dimensions_cannot_be_drawn(spem: Spem, tmp_path: Path) -> None:
-    """A picture of a shape in four dimensions is refused before it is solved."""
+    """A picture of a shape in four dimensions is refused before it is solved, with what to do."""
     np.save(tmp_path / "four.npy", np.pad(np.ones((3,) * 4, bool), 1))
-    refused(spem("field", tmp_path / "four.npy", "--rho", "2", "--plot", tmp_path / "p.png"), "dimensions")
+    result = spem("field", tmp_path / "four.npy", "--rho", "2", "--plot", tmp_path / "p.png")
+    refused(result, "4 dimensions", "leave out --plot")
 
 
 def test_unexpected_error_is_one_line(spem: Spem, image: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import nibabel
 import numpy as np
 import pytest
 from typer.testing import Result
@@ -42,7 +43,10 @@ def test_field_writes_points_and_values(spem: Spem, image: Path, tmp_path: Path)
     result = spem("field", image, "--rho", "2", "--rho", "inf", "-o", target, "--json")
     assert result.exit_code == 0, result.stderr
     with np.load(target) as found:
-        assert set(found) == {"points", "values", "rho", "spacing"}
+        assert set(found) == {"points", "values", "rho", "spacing", "origin", "name", "boundary"}
+        assert (str(found["name"]), str(found["boundary"])) == ("ellipse", "surface")
+        index = (found["points"] - found["origin"]) / found["spacing"]
+        np.testing.assert_array_equal(index.min(axis=0), [1, 1])
         assert found["points"].shape == (found["values"].shape[0], 2)
         np.testing.assert_array_equal(found["rho"], [2, np.inf])
         assert found["values"].shape[1] == 2
@@ -52,6 +56,17 @@ def test_field_writes_points_and_values(spem: Spem, image: Path, tmp_path: Path)
     summary = json.loads(result.stdout)
     assert summary["rho"] == [2.0, "inf"]
     assert summary["output"] == str(target)
+
+
+def test_affine_of_a_scan_is_in_the_file(spem: Spem, tmp_path: Path) -> None:
+    """Points of a scan stay index times spacing; the affine beside them takes indices to the world."""
+    affine = np.array([[0.0, 2, 0, 7], [-1, 0, 0, 5], [0, 0, 3, 1], [0, 0, 0, 1]])
+    nibabel.save(nibabel.Nifti1Image(np.pad(np.ones((5, 6, 7), np.uint8), 2), affine), tmp_path / "s.nii")
+    assert spem("field", tmp_path / "s.nii", "--rho", "3", "-o", tmp_path / "f.npz").exit_code == 0
+    with np.load(tmp_path / "f.npz") as found:
+        np.testing.assert_allclose(found["affine"], affine)
+        np.testing.assert_allclose(found["spacing"], [1, 2, 3])
+        np.testing.assert_allclose(found["points"].min(axis=0), [2, 4, 6])
 
 
 def test_field_of_a_mesh_takes_the_voxel_budget(spem: Spem, mesh: Path, tmp_path: Path) -> None:
@@ -88,7 +103,8 @@ def test_maps_write_basis_and_variance(spem: Spem, image: Path, tmp_path: Path) 
     result = spem("maps", image, *options, "--device", "cpu", "-o", target, "--json")
     assert result.exit_code == 0, result.stderr
     with np.load(target) as found:
-        assert set(found) == {"points", "maps", "basis", "variance", "rho", "spacing"}
+        own = {"maps", "basis", "variance", "explained"}
+        assert set(found) == own | {"points", "rho", "spacing", "origin", "name", "boundary"}
         assert found["maps"].shape == (len(found["points"]), 3)
         np.testing.assert_allclose(found["basis"].T @ found["basis"], np.eye(3), atol=1e-9)
         np.testing.assert_allclose((found["maps"] ** 2).mean(axis=0), found["variance"], rtol=1e-3)

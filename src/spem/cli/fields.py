@@ -29,7 +29,7 @@ from spem.cli.options import (
     tell_repairs,
 )
 from spem.cli.output import PLOT_SUFFIXES, check_target, print_json, write_figure, write_npz
-from spem.errors import ParameterError
+from spem.errors import ParameterError, ShapeError
 
 if TYPE_CHECKING:
     from spem.shapes.shape import Shape
@@ -74,8 +74,10 @@ def field(
 ) -> None:
     """Compute the fields of a shape: Δv − v/ρ² = 0, v = 1 around it.
 
-    The file holds points (n, d), values (n, n_rho), rho and spacing. Coordinates are the shape's own:
-    array-axis order (row, column, ...) times the spacing for images and volumes, x y z for meshes.
+    The file holds points (n, d), values (n, n_rho), rho, spacing, origin of the grid, name and boundary.
+    Coordinates are the shape's own: array-axis order (row, column, ...) times the spacing for images and
+    volumes, x y z for meshes. Of NIfTI there is the file's affine too: it takes array indices, which are
+    points over the spacing of the file, to the world.
 
     \b
     Examples:
@@ -96,7 +98,8 @@ def field(
 
     values = solve(found, values_of_rho, boundary=boundary.value)
     if output is not None:
-        write_npz(output, points=found.points, values=values, rho=values_of_rho, spacing=found.spacing)
+        about = _about(found, boundary.value)
+        write_npz(output, points=found.points, values=values, rho=values_of_rho, **about)
     if plot is not None:
         from spem.plots.figures import figure_fields
 
@@ -134,8 +137,8 @@ def maps(
     """Compute the SPEM maps of a shape.
 
     Maps are the principal components of the fields over ρ. The file holds points (n, d), maps (n, k),
-    basis (n_rho, k), variance (k,), rho and spacing. Without bounds, ρ runs over a range set by the
-    shape's size.
+    basis (n_rho, k), variance and its share explained (k,), and what that of `spem field` has beside
+    values. Without bounds, ρ runs over a range set by the shape's size.
 
     \b
     Examples:
@@ -155,9 +158,9 @@ def maps(
     _check_bounds(found.size, rho_min, rho_max)
     rho = sample_rho(found.size, rho_min, rho_max, n_rho, rho_scheme.value)
     result = project(found, n_maps, centred=centred, rho=rho, boundary=boundary.value)
-    arrays = {"basis": result.basis, "variance": result.variance, "rho": rho, "spacing": found.spacing}
+    arrays = {"basis": result.basis, "variance": result.variance, "explained": result.explained, "rho": rho}
     if output is not None:
-        write_npz(output, points=found.points, maps=result.values, **arrays)
+        write_npz(output, points=found.points, maps=result.values, **arrays, **_about(found, boundary.value))
     if plot is not None:
         from spem.plots.figures import figure_maps
 
@@ -196,7 +199,17 @@ def _check_drawable(shape: Shape, plot: Path | None) -> None:
     if plot is not None:
         from spem.plots.values import require_drawable
 
-        require_drawable(shape)
+        try:
+            require_drawable(shape)
+        except ShapeError as error:
+            msg = f"{shape.name}: has {shape.ndim} dimensions and no picture is made of more than 3; "
+            raise ShapeError(msg + "leave out --plot, give -o") from error
+
+
+def _about(shape: Shape, boundary: str) -> dict[str, Any]:
+    """Return what arrays of nodes need to be understood without the shape."""
+    about = {"spacing": shape.spacing, "origin": shape.origin, "name": shape.name, "boundary": boundary}
+    return about if shape.affine is None else about | {"affine": shape.affine}
 
 
 def _summarise(

@@ -12,6 +12,7 @@ from spem.cli.output import (
     check_folder,
     check_target,
     complain,
+    counted,
     print_json,
     print_table,
     to_json,
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from spem.codes.codes import Codes
     from spem.retrieval.evaluation import Scores
 
 REPORT = "report.html"
@@ -60,25 +62,33 @@ def search(
 def evaluate(
     codes: CodesFile,
     labels: Annotated[
-        Path, typer.Option(help="Labels: lines 'file,label', or a Princeton classification (.cla).")
+        Path, typer.Option(metavar="FILE", help="Lines 'file,label', or a Princeton classification (.cla).")
     ],
     json: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write the scores as JSON; - is stdout.")
+        Path | None,
+        typer.Option(
+            "--json", metavar="FILE", help="Write the scores to FILE as JSON; - is standard output."
+        ),
     ] = None,
     report: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Write report.html, a page on the collection, there."),
     ] = None,
+    ignore_unlabelled: Annotated[
+        bool, typer.Option("--ignore-unlabelled", help="Leave out shapes that have no label.")
+    ] = False,
     jobs: Jobs = None,
 ) -> None:
     """Score a collection whose labels are known.
 
     NN, FT, ST, E and DCG in percent, each shape being a query in turn, and the bull's-eye score.
+    A file is labelled by its path or name; each shape of a label volume by its own, such as teeth-3.
 
     \b
     Examples:
       spem evaluate shapes.spem --labels shapes/labels.csv
       spem evaluate shapes.spem --labels test.cla --json scores.json --report report/
+      spem evaluate shapes.spem --labels some.csv --ignore-unlabelled --json -
     """  # noqa: D301
     to_stdout = json is not None and str(json) == "-"
     if json is not None and not to_stdout:
@@ -92,11 +102,12 @@ def evaluate(
     from spem.retrieval.labels import match_labels, read_labels, unused_labels
 
     collection, table = Codes.load(codes), read_labels(labels)
-    keys = row_keys(collection)
-    classes = match_labels(keys, table)
-    unused = unused_labels(keys, table)
+    unused = unused_labels(row_keys(collection), table)
     if unused:
-        complain(f"{labels}: {len(unused)} labels are for files without a code, such as {unused[0]}")
+        complain(f"{labels}: {counted(len(unused), 'label')} without a code, such as {unused[0]}")
+    if ignore_unlabelled:
+        collection = _labelled(collection, table)
+    classes = match_labels(row_keys(collection), table)
     distances = correlation_distance(collection.vectors, collection.vectors)
     scores = score(distances, classes)
     facts = summary(scores)
@@ -106,6 +117,8 @@ def evaluate(
         print_json(facts)
     else:
         print_scores(facts)
+    if json is not None and not to_stdout:
+        typer.echo(f"wrote {json}")
     if report is not None:
         from spem.cli.report import write_collection_report
 
@@ -121,6 +134,17 @@ def evaluate(
         typer.echo(f"wrote {page}", err=to_stdout)
 
 
+def _labelled(codes: Codes, table: dict[str, str]) -> Codes:
+    """Return the codes of the shapes that have a label, and tell how many have none."""
+    from spem.collections import row_keys
+    from spem.retrieval.labels import labelled
+
+    kept = codes.take(labelled(row_keys(codes), table))
+    if len(kept) < len(codes):
+        complain(f"{counted(len(codes) - len(kept), 'shape')} without a label left out")
+    return kept
+
+
 def score(distances: NDArray[np.float64], classes: list[str]) -> Scores:
     """Score the distances between shapes by the class of each, and tell of classes of one."""
     from spem.retrieval.evaluation import evaluate as score_distances
@@ -130,7 +154,7 @@ def score(distances: NDArray[np.float64], classes: list[str]) -> Scores:
         alone = ", ".join(classes[i] for i in scores.skipped[:3]) + (
             ", ..." if len(scores.skipped) > 3 else ""
         )
-        complain(f"{len(scores.skipped)} shapes are alone in their class and not scored: {alone}")
+        complain(f"{counted(len(scores.skipped), 'shape')} alone in a class of one, not scored: {alone}")
     return scores
 
 
@@ -151,5 +175,6 @@ def print_scores(facts: dict[str, Any]) -> None:
     from spem.retrieval.evaluation import MEASURES
 
     columns = {name: name for name in MEASURES} | {"bulls_eye": "bull's eye"}
-    typer.echo(f"{facts['n_shapes']} shapes in {facts['n_classes']} classes, percent")
+    classes = "1 class" if facts["n_classes"] == 1 else f"{facts['n_classes']} classes"
+    typer.echo(f"{counted(facts['n_shapes'], 'shape')} in {classes}, percent")
     print_table(tuple(columns.values()), [tuple(f"{facts[name]:.1f}" for name in columns)])

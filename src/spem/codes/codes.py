@@ -16,6 +16,7 @@ from spem.codes.container import read_container, write_container
 from spem.codes.model import Model
 from spem.codes.places import found_path, stored_path
 from spem.errors import ModelError, ParameterError, ReadError
+from spem.shapes.limits import check_file
 
 
 @dataclass(frozen=True)
@@ -188,13 +189,15 @@ def file_hash(path: str | os.PathLike[str]) -> str:
     Examples
     --------
     >>> import tempfile
-    >>> with tempfile.NamedTemporaryFile() as empty:
-    ...     file_hash(empty.name)[:12]
-    'e3b0c44298fc'
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "abc").write_bytes(b"abc")
+    ...     file_hash(Path(folder, "abc"))[:12]
+    'ba7816bf8f01'
     """
+    check_file(Path(path))
     try:
         with Path(path).open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror}); give a file that exists"
+        msg = f"{path}: cannot be read ({error.strerror}); check its permissions"
         raise ReadError(msg) from error

@@ -109,10 +109,38 @@ def match_labels(names: Sequence[str | Path], labels: Mapping[str, str]) -> list
     if missing:
         msg = (
             f"{len(missing)} of {len(names)} shapes have no label: {_some(missing)}; "
-            "add lines 'file,label' for them or leave them out"
+            "add lines 'file,label' (shapes of a label volume are named as in 'teeth-3,molar'), "
+            "or leave them out with ignore_unlabelled (--ignore-unlabelled)"
         )
         raise LabelError(msg)
     return [labels[key] for key in keys if key is not None]
+
+
+def labelled(names: Sequence[str | Path], labels: Mapping[str, str]) -> list[int]:
+    """Return the places, among the shapes, of those that have a label.
+
+    Parameters
+    ----------
+    names
+        ``(n,)`` paths, file names or names of the shapes.
+    labels
+        File → label, as `read_labels` gives them.
+
+    Raises
+    ------
+    LabelError
+        If none has, or more than one label could be meant.
+
+    Examples
+    --------
+    >>> labelled(["rex.png", "tom.png"], {"tom": "cat"})
+    [1]
+    """
+    places = [i for i, key in enumerate(_resolve(names, labels)) if key is not None]
+    if not places:
+        msg = f"none of the {len(names)} shapes has a label: {_some([str(name) for name in names])}"
+        raise LabelError(msg)
+    return places
 
 
 def unused_labels(names: Sequence[str | Path], labels: Mapping[str, str]) -> list[str]:

@@ -133,16 +133,19 @@ def check_file(path: Path) -> None:
     >>> check_file(Path("absent.png"))
     Traceback (most recent call last):
     ...
-    spem.errors.ReadError: absent.png: cannot be opened (No such file or directory); check the path
+    spem.errors.ReadError: absent.png: no such file; check the path
     """
-    try:
-        size = path.stat().st_size
-    except OSError as error:
-        msg = f"{path}: cannot be opened ({error.strerror or 'no such file'}); check the path"
-        raise ReadError(msg) from error
     if path.is_dir():
         msg = f"{path}: is a folder, expected a file"
         raise ReadError(msg)
+    try:
+        size = path.stat().st_size
+    except (FileNotFoundError, NotADirectoryError) as error:
+        msg = f"{path}: no such file; check the path"
+        raise ReadError(msg) from error
+    except OSError as error:
+        msg = f"{path}: cannot be opened ({error.strerror}); check the path"
+        raise ReadError(msg) from error
     if size == 0:
         msg = f"{path}: the file is empty (0 bytes)"
         raise ReadError(msg)

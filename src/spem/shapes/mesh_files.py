@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from spem.errors import ReadError
 from spem.shapes.kinds import MESH_SUFFIXES
+from spem.shapes.limits import check_file
 
 # The counts of an OFF file stand among its first words, behind comments at most.
 _HEADER_LINES = 100
@@ -40,17 +41,12 @@ def load_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     >>> load_mesh(Path("absent.obj"))
     Traceback (most recent call last):
     ...
-    spem.errors.ReadError: absent.obj: no such file
+    spem.errors.ReadError: absent.obj: no such file; check the path
     """
     if path.suffix.lower() not in MESH_SUFFIXES:
         msg = f"{path}: expected a mesh as {', '.join(MESH_SUFFIXES)}, got {path.suffix or 'no suffix'}"
         raise ReadError(msg)
-    if not path.is_file():
-        msg = f"{path}: no such file"
-        raise ReadError(msg)
-    if not path.stat().st_size:
-        msg = f"{path}: the file is empty; expected a mesh"
-        raise ReadError(msg)
+    check_file(path)
     try:
         mesh = trimesh.load_scene(path, process=False, skip_materials=True).to_mesh()
         vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
@@ -61,6 +57,10 @@ def load_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         reason = " ".join(reason.split())[:120] or type(error).__name__
         msg = f"{path}: cannot be read as {path.suffix[1:].upper()} ({reason}); the file may be truncated"
         raise ReadError(msg) from error
+    if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
+        stray = faces.max() if faces.min() >= 0 else faces.min()
+        msg = f"{path}: a face names vertex {stray}, counted from 0, of {len(vertices)}; the file is damaged"
+        raise ReadError(msg)
     if not len(faces):
         msg = f"{path}: no faces in it; expected a triangle or polygon mesh"
         raise ReadError(msg)
