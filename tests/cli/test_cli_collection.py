@@ -368,7 +368,7 @@ def test_stopped_encode_goes_on(start: Start, spem: Spem, tmp_path: Path) -> Non
         os.killpg(second.pid, signal.SIGINT)
         _, said = second.communicate(timeout=30)
     assert second.returncode == 130
-    assert "are done already; going on" in said
+    assert "done already; going on" in said
     assert "give the same command again" in said
     assert len(said.strip().splitlines()) == 2, said
     third = spem("encode", shapes, "-o", target, *options[:-1], 1)

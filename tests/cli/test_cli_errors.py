@@ -70,13 +70,6 @@ def test_bad_rho(spem: Spem, image: Path, tmp_path: Path, rho: str) -> None:
     refused(spem("field", image, f"--rho={rho}", "-o", tmp_path / "f.npz"), "rho", "positive")
 
 
-def test_missing_rho_is_wrong_usage(spem: Spem, image: Path, tmp_path: Path) -> None:
-    """`field` without --rho is told what it lacks."""
-    result = spem("field", image, "-o", tmp_path / "f.npz")
-    assert result.exit_code == 2
-    assert "--rho" in result.stderr
-
-
 @pytest.mark.parametrize(
     ("options", "word"),
     [
@@ -128,6 +121,53 @@ def test_four_dimensions_cannot_be_drawn(spem: Spem, tmp_path: Path) -> None:
     np.save(tmp_path / "four.npy", np.pad(np.ones((3,) * 4, bool), 1))
     result = spem("field", tmp_path / "four.npy", "--rho", "2", "--plot", tmp_path / "p.png")
     refused(result, "4 dimensions", "leave out --plot")
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("--rho", "2", "--boundary", "foo"), "'--boundary': 'foo' is not one of 'surface', 'voxel'"),
+        (("--rho", "4,x"), "--rho 4,x: expected numbers above zero, or inf"),
+        (("--rho", "2", "--voxels", "0"), "Invalid value for '--voxels'"),
+        (("--rho", "2", "--bogus"), "--bogus"),
+        ((), "Missing option '--rho'"),
+    ],
+)
+def test_wrong_usage_is_one_line(
+    spem: Spem, image: Path, tmp_path: Path, options: tuple[str, ...], word: str
+) -> None:
+    """What the parser refuses is told as any other error, on one line."""
+    result = spem("field", image, "-o", tmp_path / "f.npz", *options)
+    refused(result, word)
+    assert "Input should" not in result.stderr
+
+
+@pytest.mark.parametrize("name", ["none.png", "none.npy", "none.obj", "none.xyz"])
+def test_missing_files_are_told_alike(spem: Spem, tmp_path: Path, name: str) -> None:
+    """A file that is not there is told in the same words whatever its kind."""
+    refused(spem("info", tmp_path / name), f"{name}: no such file; check the path")
+    refused(spem("evaluate", tmp_path / name, "--labels", "x.csv"), f"{name}: no such file")
+
+
+def test_sources_that_are_no_files(spem: Spem, image: Path, tmp_path: Path) -> None:
+    """A folder, an empty name, Python objects and faces without their vertices are told as such."""
+    refused(spem("info", tmp_path), "is a folder")
+    refused(spem("info", ""), "empty name")
+    refused(spem("encode", "", "-o", tmp_path / "c.spem"), "a path is empty")
+    np.save(tmp_path / "objects.npy", np.array([{}], object), allow_pickle=True)
+    refused(spem("info", tmp_path / "objects.npy"), "holds Python objects, which spem never loads")
+    refused(spem("info", image, "--spacing", "0.0001"), "fewer --voxels or a larger --spacing")
+
+
+@pytest.mark.parametrize("options", [(), ("--overwrite",)])
+def test_codes_do_not_replace_an_image(
+    spem: Spem, image: Path, mesh: Path, tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    """An image under the name of the codes is neither read as codes nor lost."""
+    target = tmp_path / "hand.png"
+    target.write_bytes(image.read_bytes())
+    refused(spem("encode", mesh, "-o", target, *options), "hand.png: is an image, not spem codes")
+    assert target.read_bytes() == image.read_bytes()
 
 
 def test_unexpected_error_is_one_line(spem: Spem, image: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,7 +40,7 @@ def test_repairs_are_told(spem: Spem, tmp_path: Path) -> None:
 def test_field_writes_points_and_values(spem: Spem, image: Path, tmp_path: Path) -> None:
     """`field` writes one row a node and one column a ρ, on the image's own grid; inf gives one everywhere."""
     target = tmp_path / "new" / "f.npz"
-    result = spem("field", image, "--rho", "2", "--rho", "inf", "-o", target, "--json")
+    result = spem("field", image, "--rho", "2,4", "--rho", "inf", "-o", target, "--json")
     assert result.exit_code == 0, result.stderr
     with np.load(target) as found:
         assert set(found) == {"points", "values", "rho", "spacing", "origin", "name", "boundary"}
@@ -48,13 +48,13 @@ def test_field_writes_points_and_values(spem: Spem, image: Path, tmp_path: Path)
         index = (found["points"] - found["origin"]) / found["spacing"]
         np.testing.assert_array_equal(index.min(axis=0), [1, 1])
         assert found["points"].shape == (found["values"].shape[0], 2)
-        np.testing.assert_array_equal(found["rho"], [2, np.inf])
-        assert found["values"].shape[1] == 2
+        np.testing.assert_array_equal(found["rho"], [2, 4, np.inf])
+        assert found["values"].shape[1] == 3
         assert 0 < found["values"][:, 0].min() < found["values"][:, 0].max() < 1
-        np.testing.assert_allclose(found["values"][:, 1], 1, atol=1e-9)
+        np.testing.assert_allclose(found["values"][:, 2], 1, atol=1e-9)
         np.testing.assert_array_equal(found["points"] % 1, 0)
     summary = json.loads(result.stdout)
-    assert summary["rho"] == [2.0, "inf"]
+    assert summary["rho"] == [2.0, 4.0, "inf"]
     assert summary["output"] == str(target)
 
 
@@ -85,6 +85,15 @@ def test_grid_options(spem: Spem, mesh: Path, grid: tuple[str, str]) -> None:
     facts = json.loads(spem("info", mesh, "--json", *grid).stdout)
     spacing = 0.2 if grid[0] == "--spacing" else 1 / 6
     assert facts["spacing"] == pytest.approx([spacing] * 3, rel=0.1)
+
+
+def test_what_is_done_unasked_is_told(spem: Spem, image: Path, tmp_path: Path) -> None:
+    """Labels that are taken together are told with the way to take one; resampling as asked is a note."""
+    np.save(tmp_path / "labels.npy", np.kron([[0, 1, 2, 5, 0]], np.ones((4, 4), int)))
+    result = spem("field", tmp_path / "labels.npy", "--rho", "2", "-o", tmp_path / "f.npz")
+    assert "labels.npy: 3 labels together: 1, 2, 5; --label takes one of them" in result.stderr
+    result = spem("field", image, "--rho", "2", "--spacing", "0.8", "-o", tmp_path / "f.npz")
+    assert "ellipse.png: note: resampled from spacing 1 x 1 to 0.8 x 0.8" in result.stderr
 
 
 def test_boundary_voxel_lowers_the_field(spem: Spem, image: Path, tmp_path: Path) -> None:

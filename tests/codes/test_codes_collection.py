@@ -100,7 +100,7 @@ def test_unexpected_exception_is_one_failure(folder: Path, monkeypatch: pytest.M
 def test_nothing_to_code_is_an_error(tmp_path: Path) -> None:
     """A collection without one readable shape is refused."""
     (tmp_path / "a.npy").write_bytes(b"")
-    message = r"no shape could be read.*: .*b\.npy: cannot be read .* \(and 1 more\)$"
+    message = r"no shape could be read.*: .*b\.npy: no such file; check the path \(and 1 more\)$"
     with pytest.raises(ReadError, match=message) as caught:
         encode_collection([tmp_path / "a.npy", tmp_path / "b.npy"], SETTINGS)
     assert [Path(failure.path).name for failure in caught.value.failures] == ["b.npy", "a.npy"]

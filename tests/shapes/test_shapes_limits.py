@@ -71,7 +71,7 @@ def test_sizes_are_written_in_the_largest_unit():
 
 def test_paths_that_hold_nothing_are_refused(tmp_path):
     """Missing and empty files and folders are told apart."""
-    with pytest.raises(ReadError, match=r"absent.png: cannot be opened \(No such file"):
+    with pytest.raises(ReadError, match=r"absent.png: no such file; check the path"):
         check_file(tmp_path / "absent.png")
     with pytest.raises(ReadError, match="is a folder, expected a file"):
         check_file(tmp_path)

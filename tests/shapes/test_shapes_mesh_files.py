@@ -86,5 +86,5 @@ def test_what_is_no_mesh_is_refused(tmp_path: Path, name: str, content: str, mes
 
 def test_missing_file_is_refused(tmp_path: Path) -> None:
     """A path without a file is a ReadError."""
-    with pytest.raises(ReadError, match=r"absent\.obj: no such file"):
+    with pytest.raises(ReadError, match=r"absent\.obj: no such file; check the path"):
         load_mesh(tmp_path / "absent.obj")

@@ -209,7 +209,7 @@ def test_each_label_gives_a_shape(tmp_path):
 
 def test_files_that_are_no_volumes_are_refused_in_one_line(tmp_path):
     """Missing, empty, truncated, pickled and foreign files are told apart."""
-    with pytest.raises(ReadError, match=r"absent.npy: cannot be opened"):
+    with pytest.raises(ReadError, match=r"absent.npy: no such file"):
         read_volume(tmp_path / "absent.npy")
     (tmp_path / "x.txt").write_text("x")
     with pytest.raises(ReadError, match=r"x.txt: not a volume file; expected one of .npy, .npz"):
@@ -227,7 +227,7 @@ def test_files_that_are_no_volumes_are_refused_in_one_line(tmp_path):
     with pytest.raises(ReadError, match=r"a.npy: damaged, truncated"):
         read_volume(tmp_path / "a.npy")
     np.save(tmp_path / "p.npy", np.array([{}], object), allow_pickle=True)
-    with pytest.raises(ReadError, match=r"p.npy: holds Python objects; expected an array of numbers"):
+    with pytest.raises(ReadError, match=r"p.npy: holds Python objects, which spem never loads"):
         read_volume(tmp_path / "p.npy")
     np.savez(tmp_path / "s.npz", spacing=np.ones(3))
     with pytest.raises(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import functools
 import os
+import re
 import sys
 import traceback
 from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from spem import __version__
 from spem.cli.demo import demo
@@ -18,12 +20,47 @@ from spem.cli.fields import field, maps
 from spem.cli.info import info
 from spem.cli.output import complain
 from spem.cli.search import evaluate, search
-from spem.errors import SpemError
+from spem.errors import SizeError, SpemError
 
 DONE, PARTIAL, NOTHING, INTERRUPTED = 0, 1, 2, 130
 
+# Typer brings its own click or uses that which is installed; the base is the same in either.
+_WrongUsage: Any = typer.BadParameter.__bases__[0]
+
+
+class _Commands(TyperGroup):
+    """The commands; wrong usage is told on one line, as any other error."""
+
+    def main(self, *args: Any, standalone_mode: bool = True, **extra: Any) -> Any:
+        """Run a command and exit with its status."""
+        try:
+            status = super().main(*args, **(extra | {"standalone_mode": False}))
+        except _WrongUsage as error:
+            status = NOTHING
+            if type(error).__name__ == "NoArgsIsHelpError":
+                error.show()
+            else:
+                complain(plain_usage(error.format_message()))
+        except typer.Abort:
+            status = INTERRUPTED
+        return sys.exit(status or DONE) if standalone_mode else status
+
+
+def plain_usage(message: str) -> str:
+    """Return what the parser says of wrong usage on one line and in the words of spem.
+
+    Examples
+    --------
+    >>> plain_usage("Invalid value for '--voxels': Input should be greater than or equal to 1")
+    "Invalid value for '--voxels': expected greater than or equal to 1"
+    """
+    text = message.replace("Value error, ", "").replace("Input should be", "expected")
+    return re.sub(r", unable to parse .*", "", " ".join(text.split())).rstrip(".")
+
+
 app = typer.Typer(
     name="spem",
+    cls=_Commands,
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
@@ -92,6 +129,10 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
         except KeyboardInterrupt as stop:
             complain(str(stop) or "interrupted")
             raise typer.Exit(INTERRUPTED) from None
+        except SizeError as error:
+            _refuse(
+                f"{error}; a grid that was asked for is smaller with fewer --voxels or a larger --spacing"
+            )
         except SpemError as error:
             _refuse(str(error))
         except MemoryError:

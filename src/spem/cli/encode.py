@@ -18,7 +18,7 @@ from spem.cli.options import (
     SchemeChoice,
     check_device,
 )
-from spem.cli.output import check_target, complain, print_json
+from spem.cli.output import check_target, complain, counted, print_json
 from spem.cli.progress import Bar
 from spem.errors import ModelError, ParameterError, ReadError
 
@@ -170,8 +170,12 @@ def encode_paths(
     from spem.codes.sources import find_files
     from spem.codes.work import clear_work
     from spem.codes.workers import count_processes
+    from spem.shapes.kinds import kind_of
 
     files = [path for path in find_files(paths) if path.absolute() != output.absolute()]
+    if overwrite and output.exists() and kind_of(output):
+        msg = f"{output}: is {kind_of(output)}, not spem codes; write to another file"
+        raise ParameterError(msg)
     known = Codes.load(output) if output.exists() and not overwrite else None
     model = load_model(vocabulary) if vocabulary is not None else None
     if known is not None and model is not None and model.digest != known.model.digest:
@@ -275,7 +279,7 @@ def _tell(output: Path, codes: Codes, failures: tuple[Failure, ...], *, json: bo
     """Tell what was written, and what failed in this run."""
     if not json:
         failed = f", {len(failures)} failed" if failures else ""
-        typer.echo(f"wrote {output}: {len(codes)} shapes{failed}, model {codes.model.digest}")
+        typer.echo(f"wrote {output}: {counted(len(codes), 'shape')}{failed}, model {codes.model.digest}")
         return
     facts = {"output": output, "n_shapes": len(codes), "n_failed": len(failures)}
     facts |= {"model": codes.model.digest, "settings": codes.model.settings.to_json()}

@@ -55,8 +55,10 @@ RhoHigh = Annotated[
 def field(
     shape: ShapeFile,
     rho: Annotated[
-        list[float],
-        typer.Option(help="Screening length in the unit of the spacing, or inf; repeatable."),
+        list[str],
+        typer.Option(
+            metavar="RHO", help="Screening lengths in the unit of the spacing, or inf: 4,8,16; repeatable."
+        ),
     ],
     output: FieldFile = None,
     plot: Plot = None,
@@ -81,14 +83,14 @@ def field(
 
     \b
     Examples:
-      spem field hand.png --rho 4 --rho 16 --rho inf -o hand.npz --plot hand-fields.png
+      spem field hand.png --rho 4,16,inf -o hand.npz --plot hand-fields.png
       spem field cat.off --rho 3 --voxels 100000 --boundary voxel -o cat.npz
     """  # noqa: D301
     check_device(device)
     _check_targets(output, plot)
     from spem.fields.rho import check_rho
 
-    values_of_rho = check_rho(rho)
+    values_of_rho = check_rho(_numbers(rho))
     grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius}
     inside = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
     found = read_shape(shape, **grid, **inside, components=components)  # type: ignore[arg-type]
@@ -168,6 +170,15 @@ def maps(
     summary = {"boundary": boundary.value, "rho": rho[[0, -1]], "n_rho": rho.size, "n_maps": n_maps}
     summary |= {"variance": result.variance, "explained": result.explained}
     _summarise(found, summary, output, plot, json=json)
+
+
+def _numbers(texts: list[str]) -> list[float]:
+    """Parse ρ, several of them parted by commas."""
+    try:
+        return [float(part) for text in texts for part in text.split(",")]
+    except ValueError as error:
+        msg = f"--rho {' '.join(texts)}: expected numbers above zero, or inf, such as 4,8,16"
+        raise ParameterError(msg) from error
 
 
 def _check_bounds(size: float, low: float | None, high: float | None) -> None:

@@ -44,7 +44,7 @@ class SideChoice(StrEnum):
     positive = "positive"
 
 
-ShapeFile = Annotated[Path, typer.Argument(metavar="SHAPE", help="Image, volume or mesh.")]
+ShapeFile = Annotated[str, typer.Argument(metavar="SHAPE", help="Image, volume or mesh.")]
 Voxels = Annotated[
     int | None,
     typer.Option(
@@ -102,7 +102,7 @@ def check_device(device: str) -> None:
 
 
 def read_shape(
-    path: Path,
+    path: str,
     *,
     voxels: int | None = None,
     spacing: float | None = None,
@@ -137,5 +137,11 @@ def read_shape(
 
 def tell_repairs(shape: Shape) -> None:
     """Tell on stderr what was changed when a shape was read."""
+    source = shape.report.source or shape.name
+    for phrase in shape.report.method.split("; "):
+        if "labels together" in phrase:
+            complain(f"{source}: {phrase}; --label takes one of them")
     for repair in shape.report.repairs:
-        complain(f"{shape.report.source or shape.name}: {repair}")
+        # a grid is changed only when that is asked for
+        asked = "note: " if repair.startswith("resampled from") else ""
+        complain(f"{source}: {asked}{repair}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Self
 
-from spem.cli.output import complain
+from spem.cli.output import complain, counted
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -47,7 +47,7 @@ class Bar:
     def advance(self, stage: str, done: int, total: int) -> None:
         """Show that so many of a stage are done."""
         if stage not in self._seen and done > 0 and stage == "fields":
-            complain(f"{done} of {total} shapes are done already; going on")
+            complain(f"{done} of {counted(total, 'shape')} done already; going on")
         self._seen.add(stage)
         if self._progress is None:
             return

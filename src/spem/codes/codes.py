@@ -16,7 +16,6 @@ from spem.codes.container import read_container, write_container
 from spem.codes.model import Model
 from spem.codes.places import found_path, stored_path
 from spem.errors import ModelError, ParameterError, ReadError
-from spem.shapes.limits import check_file
 
 
 @dataclass(frozen=True)
@@ -194,10 +193,12 @@ def file_hash(path: str | os.PathLike[str]) -> str:
     ...     file_hash(Path(folder, "abc"))[:12]
     'ba7816bf8f01'
     """
-    check_file(Path(path))
     try:
         with Path(path).open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
+    except FileNotFoundError as error:
+        msg = f"{path}: no such file; check the path"
+        raise ReadError(msg) from error
     except OSError as error:
         msg = f"{path}: cannot be read ({error.strerror}); check its permissions"
         raise ReadError(msg) from error

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from spem.codes.files import write_whole
 from spem.errors import ModelError, ReadError
+from spem.shapes.kinds import kind_of
 
 # Raised when the layout of the file changes: names of arrays, keys of the header, the hash.
 CONTAINER_FORMAT = 1
@@ -113,6 +114,10 @@ def read_container(path: str | os.PathLike[str], kind: str) -> tuple[dict[str, A
         envelope = json.loads(members.pop("header").tobytes())
         found, version, header = envelope["kind"], int(envelope["format"]), dict(envelope["header"])
     except _DAMAGE as error:
+        other = kind_of(source)
+        if other:
+            msg = f"{source}: is {other}, not spem {kind}; give another file"
+            raise ReadError(msg) from error
         msg = f"{source}: not a whole file of spem {kind}; it may be truncated: make it again"
         raise ReadError(msg) from error
     if version > CONTAINER_FORMAT:

@@ -12,7 +12,7 @@ import numpy as np
 
 from spem.codes.codes import file_hash
 from spem.codes.settings import Settings
-from spem.errors import ReadError, SpemError
+from spem.errors import ParameterError, ReadError, SpemError
 from spem.shapes.components import keep_components
 from spem.shapes.kinds import MESH_SUFFIXES, SUFFIXES, has_suffix, is_volume
 from spem.shapes.read import read
@@ -40,6 +40,8 @@ def find_files(paths: Iterable[str | Path]) -> list[Path]:
     ------
     ReadError
         When a path or a pattern leads to nothing.
+    ParameterError
+        When a path is empty.
 
     Examples
     --------
@@ -53,6 +55,9 @@ def find_files(paths: Iterable[str | Path]) -> list[Path]:
     found: dict[Path, None] = {}
     for given in paths:
         path = Path(given)
+        if not str(given):
+            msg = "a path is empty; give a file, a folder or a pattern, '.' for the working directory"
+            raise ParameterError(msg)
         if path.is_dir():
             inside = _walk(path)
             if not inside:

@@ -53,12 +53,12 @@ def read_labels(path: str | Path) -> dict[str, str]:
     try:
         text = source.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        reason = (
-            "is not UTF-8 text"
-            if isinstance(error, UnicodeDecodeError)
-            else f"cannot be read: {error.strerror}"
-        )
-        msg = f"{source}: the labels file {reason}"
+        reason = "the labels file is not UTF-8 text"
+        if isinstance(error, FileNotFoundError):
+            reason = "no such file; expected labels"
+        elif isinstance(error, OSError):
+            reason = f"the labels file cannot be read: {error.strerror}"
+        msg = f"{source}: {reason}"
         raise ReadError(msg) from error
     lines = text.splitlines()
     pairs = _classification(source, lines) if _is_classification(source, lines) else _table(source, lines)

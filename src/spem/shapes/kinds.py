@@ -37,3 +37,15 @@ def is_volume(path: Path) -> bool:
 
         return tiff_pages(path) > 1
     return has_suffix(path, VOLUME_SUFFIXES)
+
+
+def kind_of(path: Path) -> str:
+    """Return by suffix what a file is, with its article; nothing for other kinds of files.
+
+    Examples
+    --------
+    >>> kind_of(Path("hand.png")), kind_of(Path("shapes.spem"))
+    ('an image', '')
+    """
+    kinds = {"an image": IMAGE_SUFFIXES, "a volume": VOLUME_SUFFIXES, "a mesh": MESH_SUFFIXES}
+    return next((kind for kind, suffixes in kinds.items() if has_suffix(path, suffixes)), "")

@@ -130,7 +130,11 @@ def read(
     grid = _Grid(voxels=voxels, spacing=spacing, inner_radius=inner_radius, memory_limit=memory_limit)
     values = _Values(label=label, threshold=threshold, dark=dark, signed_distance=signed_distance)
     which = "largest" if components is None else components
-    source = Path(source) if isinstance(source, str) else source
+    if isinstance(source, str):
+        if not source:
+            msg = "the source is an empty name; give a file"
+            raise ParameterError(msg)
+        source = Path(source)
     if _is_mesh(source) or (isinstance(source, Path) and has_suffix(source, MESH_SUFFIXES)):
         _refuse_unused(name or _title(source), "a mesh", **values)
         return _mesh(source, grid, which, name)

@@ -288,7 +288,8 @@ class Shape:
     def __repr__(self) -> str:
         grid = " x ".join(map(str, self.mask.shape))
         spacing = " x ".join(f"{h:.4g}" for h in self.spacing)
-        return f"Shape({self.name!r}, {self.ndim}-D, {self.n_nodes} nodes, grid {grid}, spacing {spacing})"
+        nodes = f"{self.n_nodes} node{'s' if self.n_nodes > 1 else ''}"
+        return f"Shape({self.name!r}, {self.ndim}-D, {nodes}, grid {grid}, spacing {spacing})"
 
 
 def _bounding_box(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -192,7 +192,9 @@ def _array_shape(file: IO[bytes], what: str) -> tuple[int, ...]:
     read = np.lib.format.read_array_header_1_0 if start[-2] == 1 else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(file)
     if dtype.hasobject:
-        msg = f"{what}: holds Python objects; expected an array of numbers, write one with numpy.save"
+        msg = (
+            f"{what}: holds Python objects, which spem never loads; write an array of numbers with numpy.save"
+        )
         raise ReadError(msg)
     return tuple(shape)
 
