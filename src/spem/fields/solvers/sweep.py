@@ -27,9 +27,9 @@ from spem.fields.solvers.reduced import ReducedBasis
 from spem.fields.solvers.team import Team
 
 # A block is solved to this fraction of the tolerance, or of its own start: single precision ends there.
-_MARGIN, _SINGLE_LIMIT = 0.1, 1e-6
+_MARGIN, _SINGLE_LIMIT = 0.1, 3e-7
 # The estimate stands for the shifts between its own too, so it has to be this much below the tolerance.
-_ACCEPTED = 0.25
+_ACCEPTED = 0.6
 # Basis columns kept in single precision err by about 1e-7 of the field.
 _SINGLE_STORAGE = 3e-7
 # What storing the columns adds to the error of a field, in units of their rounding.
