@@ -79,6 +79,20 @@ def test_field_of_a_mesh_takes_the_voxel_budget(spem: Spem, mesh: Path, tmp_path
         assert (found["points"] < [2, 3, 4]).all()
 
 
+def test_spacing_of_the_grid_is_declared(spem: Spem, image: Path, mesh: Path, tmp_path: Path) -> None:
+    """--grid-spacing says what a file does not, and `info` where the spacing came from."""
+    np.save(tmp_path / "box.npy", np.ones((3, 4, 5), bool))
+    facts = json.loads(spem("info", tmp_path / "box.npy", "--grid-spacing", "2,1,0.5", "--json").stdout)
+    assert (facts["spacing"], facts["voxels"], facts["volume"]) == ([2.0, 1.0, 0.5], 60, 60.0)
+    assert facts["spacing_from"] == "spacing as given"
+    facts = json.loads(spem("info", image, "--grid-spacing", "2", "--spacing", "1", "--json").stdout)
+    assert facts["spacing_from"] == "resampled from spacing 2 x 2 to 1 x 1"
+    assert json.loads(spem("info", image, "--json").stdout)["spacing_from"] == "none in the file, 1 taken"
+    assert json.loads(spem("info", mesh, "--json").stdout)["spacing_from"] == "the grid asked for"
+    assert "does not apply to a mesh" in spem("info", mesh, "--grid-spacing", "2").stderr
+    assert "--grid-spacing 2;1: expected" in spem("info", image, "--grid-spacing", "2;1").stderr
+
+
 @pytest.mark.parametrize("grid", [("--spacing", "0.2"), ("--inner-radius", "6")])
 def test_grid_options(spem: Spem, mesh: Path, grid: tuple[str, str]) -> None:
     """The spacing and the inner radius choose the grid."""

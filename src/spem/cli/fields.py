@@ -14,6 +14,7 @@ from spem.cli.options import (
     ComponentsChoice,
     Dark,
     Device,
+    GridSpacing,
     InnerRadius,
     Json,
     Label,
@@ -65,6 +66,7 @@ def field(
     voxels: Voxels = None,
     spacing: Spacing = None,
     inner_radius: InnerRadius = None,
+    grid_spacing: GridSpacing = None,
     boundary: Boundary = BoundaryChoice.surface,
     threshold: Threshold = None,
     dark: Dark = None,
@@ -91,7 +93,7 @@ def field(
     from spem.fields.rho import check_rho
 
     values_of_rho = check_rho(_numbers(rho))
-    grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius}
+    grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius, "grid_spacing": grid_spacing}
     inside = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
     found = read_shape(shape, **grid, **inside, components=components)  # type: ignore[arg-type]
     tell_repairs(found)
@@ -127,6 +129,7 @@ def maps(
     voxels: Voxels = None,
     spacing: Spacing = None,
     inner_radius: InnerRadius = None,
+    grid_spacing: GridSpacing = None,
     boundary: Boundary = BoundaryChoice.surface,
     threshold: Threshold = None,
     dark: Dark = None,
@@ -149,7 +152,7 @@ def maps(
     """  # noqa: D301
     check_device(device)
     _check_targets(output, plot)
-    grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius}
+    grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius, "grid_spacing": grid_spacing}
     inside = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
     found = read_shape(shape, **grid, **inside, components=components)  # type: ignore[arg-type]
     tell_repairs(found)

@@ -10,6 +10,7 @@ from spem.cli.options import (
     Components,
     ComponentsChoice,
     Dark,
+    GridSpacing,
     InnerRadius,
     Json,
     Label,
@@ -23,7 +24,7 @@ from spem.cli.options import (
 from spem.cli.output import print_json
 
 if TYPE_CHECKING:
-    from spem.shapes.shape import Shape
+    from spem.shapes.shape import Report, Shape
 
 
 def info(
@@ -31,6 +32,7 @@ def info(
     voxels: Voxels = None,
     spacing: Spacing = None,
     inner_radius: InnerRadius = None,
+    grid_spacing: GridSpacing = None,
     threshold: Threshold = None,
     dark: Dark = None,
     label: Label = None,
@@ -51,6 +53,7 @@ def info(
         voxels=voxels,
         spacing=spacing,
         inner_radius=inner_radius,
+        grid_spacing=grid_spacing,
         threshold=threshold,
         dark=dark,
         label=label,
@@ -93,6 +96,7 @@ def describe(shape: Shape) -> dict[str, Any]:
         "voxels": shape.n_nodes,
         "grid": list(shape.mask.shape),
         "spacing": list(shape.spacing),
+        "spacing_from": spacing_source(report),
         "origin": list(shape.origin),
         "volume": shape.volume,
         "size": shape.size,
@@ -104,6 +108,22 @@ def describe(shape: Shape) -> dict[str, Any]:
         "volume_kept": report.volume_kept,
         "repairs": list(report.repairs),
     }
+
+
+def spacing_source(report: Report) -> str:
+    """Say where the spacing of a shape comes from.
+
+    Examples
+    --------
+    >>> from spem.shapes.shape import Report
+    >>> spacing_source(Report("hand.png"))
+    'none in the file, 1 taken'
+    """
+    if report.watertight is not None:
+        return "the grid asked for"
+    resampled = [phrase for phrase in report.repairs if phrase.startswith("resampled from")]
+    told = [phrase for phrase in report.method.split("; ") if "spacing" in phrase]
+    return (resampled + told + ["none in the file, 1 taken"])[0]
 
 
 def _text(value: Any) -> str:

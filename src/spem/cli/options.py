@@ -52,7 +52,15 @@ Voxels = Annotated[
     ),
 ]
 Spacing = Annotated[
-    float | None, typer.Option(help="Distance between voxel centres, in the unit of the file.")
+    float | None,
+    typer.Option(help="Resample to this distance between voxel centres, in the unit of the file."),
+]
+GridSpacing = Annotated[
+    str | None,
+    typer.Option(
+        metavar="H[,H...]",
+        help="Spacing that the grid of an image or volume has, one or one an axis. [the file's, or 1]",
+    ),
 ]
 InnerRadius = Annotated[
     float | None, typer.Option(help="Distance from the deepest voxel to the boundary, in voxels.")
@@ -112,6 +120,7 @@ def read_shape(
     label: int | None = None,
     signed_distance: SideChoice | None = None,
     components: ComponentsChoice = ComponentsChoice.largest,
+    grid_spacing: str | None = None,
 ) -> Shape:
     """Read a shape as the options say.
 
@@ -132,7 +141,18 @@ def read_shape(
         label=label,
         signed_distance=None if signed_distance is None else signed_distance.value,
         components=components.value,
+        grid_spacing=None if grid_spacing is None else _steps(grid_spacing),
     )
+
+
+def _steps(text: str) -> float | tuple[float, ...]:
+    """Parse a spacing: one number, or one an axis."""
+    try:
+        steps = tuple(float(part) for part in text.split(","))
+    except ValueError as error:
+        msg = f"--grid-spacing {text}: expected one positive number, or one an axis such as 2,1,0.5"
+        raise ParameterError(msg) from error
+    return steps if len(steps) > 1 else steps[0]
 
 
 def tell_repairs(shape: Shape) -> None:

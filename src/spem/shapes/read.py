@@ -65,6 +65,7 @@ def read(
     threshold: float | None = None,
     dark: bool | None = None,
     signed_distance: Side | None = None,
+    grid_spacing: float | tuple[float, ...] | None = None,
     components: Literal["largest", "all"] | None = None,
     memory_limit: int | None = None,
     name: str | None = None,
@@ -97,6 +98,9 @@ def read(
         Whether the shape is darker than the background, of images.
     signed_distance
         The array or volume holds signed distances to the surface, "negative" or "positive" inside.
+    grid_spacing
+        The spacing that the grid of an image or volume file has, for all axes or one each, in place of
+        what the file says, or of 1 where it says nothing.
     components
         Keep the "largest" component or "all"; by default the largest, and all of a `Shape`.
     memory_limit
@@ -135,11 +139,13 @@ def read(
             msg = "the source is an empty name; give a file"
             raise ParameterError(msg)
         source = Path(source)
+    if array:
+        _refuse_unused(name or "array", "an array, whose own is spacing=", grid_spacing=grid_spacing)
     if _is_mesh(source) or (isinstance(source, Path) and has_suffix(source, MESH_SUFFIXES)):
-        _refuse_unused(name or _title(source), "a mesh", **values)
+        _refuse_unused(name or _title(source), "a mesh", **values, grid_spacing=grid_spacing)
         return _mesh(source, grid, which, name)
     if isinstance(source, Shape):
-        _refuse_unused(source.name, "a shape", **values)
+        _refuse_unused(source.name, "a shape", **values, grid_spacing=grid_spacing)
         shape = source if name is None else replace(source, name=name)
         if components is None:
             return _regrid(shape, grid)
@@ -147,7 +153,7 @@ def read(
         shape = _array(np.asarray(source), spacing, values, memory_limit, name or "array")
         grid["spacing"] = None
     else:
-        shape = _file(source, values, memory_limit, name)
+        shape = _file(source, values, grid_spacing, memory_limit, name)
     return _keep(shape, which, grid)
 
 
@@ -206,23 +212,39 @@ def read_all(
     return [_regrid(keep_components(shape, components), grid) for shape in shapes]
 
 
-def _file(path: Path, values: _Values, memory_limit: int | None, name: str | None) -> Shape:
-    """Read an image or a volume."""
+def _file(
+    path: Path,
+    values: _Values,
+    grid_spacing: float | tuple[float, ...] | None,
+    memory_limit: int | None,
+    name: str | None,
+) -> Shape:
+    """Read an image or a volume, on the grid that is declared where one is."""
     check_file(path)
     # one page of a TIFF may hold labels or distances as well as grey levels
     flat = values["label"] is not None or values["signed_distance"] is not None
     if is_volume(path) or (flat and has_suffix(path, TIFF_SUFFIXES)):
         from spem.shapes.volumes import read_volume
 
-        return read_volume(path, memory_limit=memory_limit, name=name, **_of_volume(values, str(path)))
+        how = _of_volume(values, str(path))
+        volume = read_volume(path, spacing=grid_spacing, memory_limit=memory_limit, name=name, **how)
+        return volume if grid_spacing is None else _declared(volume)
     if has_suffix(path, IMAGE_SUFFIXES):
         from spem.shapes.images import read_image
 
         chosen = _of_image(values, str(path))
-        return read_image(path, memory_limit=memory_limit, name=name, **chosen)
+        steps = 1.0 if grid_spacing is None else grid_spacing
+        image = read_image(path, spacing=steps, memory_limit=memory_limit, name=name, **chosen)
+        return image if grid_spacing is None else _declared(image)
     suffix = path.suffix.lower() or "(no suffix)"
     msg = f"{path}: unknown kind of file {suffix}; expected one of {', '.join(SUFFIXES)}"
     raise ReadError(msg)
+
+
+def _declared(shape: Shape) -> Shape:
+    """Say in the report that the spacing was given, in place of what the file says of it."""
+    phrases = [phrase for phrase in shape.report.method.split("; ") if "spacing" not in phrase]
+    return replace(shape, report=replace(shape.report, method="; ".join((*phrases, "spacing as given"))))
 
 
 def _array(
