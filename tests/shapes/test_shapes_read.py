@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import tifffile
+import trimesh
 from PIL import Image
 
 from spem.errors import ParameterError, ReadError, ShapeError
@@ -187,3 +188,13 @@ def test_what_cannot_be_read_is_refused(tmp_path, bar_png):
         read(bar_png, components="some")
     with pytest.raises(ShapeError, match="thinner than the new grid"):
         read(bar_png, spacing=7.0)
+
+
+def test_coarse_grids_are_told() -> None:
+    """A mesh that its grid misses by a tenth of its volume says so, as does a shape of hardly a node."""
+    ball = trimesh.creation.icosphere(3, 2.0)
+    assert read(ball, spacing=0.2).report.repairs == ()
+    coarse = read(ball, spacing=100.0)
+    assert coarse.report.repairs[0].startswith("volume +")
+    assert coarse.report.repairs[1] == "only 1 node inside: use a finer grid"
+    assert "only 3 nodes inside" in read(np.ones((1, 3), bool)).report.repairs[-1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -27,6 +27,8 @@ from spem.shapes.winding import fill_by_winding
 _BYTES_CLOSED, _BYTES_OPEN = 16, 96
 # A budget or inner radius is met within this fraction where whole voxels allow it.
 _TOLERANCE = 0.03
+# More than this share of the volume is lost or won by a coarse grid only, or counted twice by the mesh.
+_VOLUME_CHANGE = 0.1
 
 
 def read_mesh(
@@ -208,6 +210,10 @@ class _Filler:
         shape = Shape.from_mask(
             filling.mask, steps, origin=lattice.origin, name=self.name, cuts=filling.cuts, report=report
         )
+        off = shape.volume / surface.volume - 1
+        if surface.closed and abs(off) > _VOLUME_CHANGE:
+            phrase = f"volume {100 * off:+.0f} % off the mesh's: the grid is coarse, or parts overlap"
+            shape = replace(shape, report=report.with_repair(phrase))
         return keep_components(shape, self.components)
 
 

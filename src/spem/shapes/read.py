@@ -143,7 +143,7 @@ def read(
         _refuse_unused(name or "array", "an array, whose own is spacing=", grid_spacing=grid_spacing)
     if _is_mesh(source) or (isinstance(source, Path) and has_suffix(source, MESH_SUFFIXES)):
         _refuse_unused(name or _title(source), "a mesh", **values, grid_spacing=grid_spacing)
-        return _mesh(source, grid, which, name)
+        return _with_warning(_mesh(source, grid, which, name))
     if isinstance(source, Shape):
         _refuse_unused(source.name, "a shape", **values, grid_spacing=grid_spacing)
         shape = source if name is None else replace(source, name=name)
@@ -154,7 +154,7 @@ def read(
         grid["spacing"] = None
     else:
         shape = _file(source, values, grid_spacing, memory_limit, name)
-    return _keep(shape, which, grid)
+    return _with_warning(_keep(shape, which, grid))
 
 
 def _keep(shape: Shape, components: Literal["largest", "all"], grid: _Grid) -> Shape:
@@ -167,6 +167,14 @@ def _keep(shape: Shape, components: Literal["largest", "all"], grid: _Grid) -> S
     again = keep_components(regridded, components)
     found = max(kept.report.components, again.report.components)
     return replace(again, report=replace(again.report, components=found))
+
+
+def _with_warning(shape: Shape) -> Shape:
+    """Say in the report when there are too few nodes for a field to tell one shape from another."""
+    if shape.n_nodes >= 2**shape.ndim:
+        return shape
+    nodes = f"{shape.n_nodes} node{'s' if shape.n_nodes > 1 else ''}"
+    return replace(shape, report=shape.report.with_repair(f"only {nodes} inside: use a finer grid"))
 
 
 def read_all(
