@@ -80,6 +80,27 @@ def test_encode_adds_to_codes(spem: Spem, folder: Path, codes: Path) -> None:
     np.testing.assert_array_equal(after.vectors[:-1], before.vectors)
 
 
+def test_files_that_are_gone_are_told_and_pruned(spem: Spem, folder: Path, codes: Path) -> None:
+    """A file that was deleted keeps its code until --prune; the rest and its order stay."""
+    names = Codes.load(codes).names
+    (folder / "long1.npy").unlink()
+    told = spem("encode", folder, "-o", codes)
+    assert f"1 shape of {codes} is no longer in {folder}; --prune removes it" in told.stderr
+    assert set(Codes.load(codes).names) == set(names)
+    pruned = spem("encode", folder, "-o", codes, "--prune")
+    assert pruned.exit_code == 0, pruned.stderr
+    assert set(Codes.load(codes).names) == set(names) - {"long1"}
+
+
+def test_no_folder_is_left_of_nothing(spem: Spem, folder: Path, tmp_path: Path) -> None:
+    """Wrong settings, and files of which none can be read, leave neither a folder nor work."""
+    before = set(tmp_path.rglob("*"))
+    assert spem("encode", folder, "-o", tmp_path / "new" / "c.spem", "--power", "3").exit_code == 2
+    (tmp_path / "empty.npy").write_bytes(b"")
+    assert spem("encode", tmp_path / "empty.npy", "-o", tmp_path / "c.spem").exit_code == 2
+    assert set(tmp_path.rglob("*")) == before | {tmp_path / "empty.npy"}
+
+
 def test_work_survives_codes_that_cannot_be_saved(
     spem: Spem, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

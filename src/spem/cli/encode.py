@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -42,6 +43,9 @@ def encode(
     ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Make CODES anew instead of adding to it.")
+    ] = False,
+    prune: Annotated[
+        bool, typer.Option("--prune", help="Drop shapes of CODES whose files are no longer in PATH.")
     ] = False,
     voxels: Annotated[int | None, typer.Option(min=1, help="Voxels inside each shape. [15000]")] = None,
     own_grid: Annotated[
@@ -87,13 +91,12 @@ def encode(
       spem encode new/ -o new.spem --vocabulary shapes.spem
       spem encode more/ -o shapes.spem                      adds to shapes.spem
     """  # noqa: D301
+    from spem.codes.settings import Settings
+
     check_device(device)
-    check_target(output)
     if own_grid and voxels is not None:
         msg = f"--own-grid and --voxels {voxels} exclude each other; give one of them"
         raise ParameterError(msg)
-    if save_vocabulary is not None:
-        check_target(save_vocabulary)
     given = _given(
         voxels=voxels,
         boundary=boundary,
@@ -112,8 +115,20 @@ def encode(
         seed=seed,
     )
     given |= {"voxels": None} if own_grid else {}
+    if not paper:
+        Settings.of(given)
+    for target in (output, save_vocabulary):
+        if target is not None:
+            check_target(target)
     codes, failures = encode_paths(
-        paths, output, given, vocabulary=vocabulary, overwrite=overwrite, paper=paper, jobs=jobs
+        paths,
+        output,
+        given,
+        vocabulary=vocabulary,
+        overwrite=overwrite,
+        prune=prune,
+        paper=paper,
+        jobs=jobs,
     )
     if save_vocabulary is not None:
         codes.model.save(save_vocabulary)
@@ -129,6 +144,7 @@ def encode_paths(
     *,
     vocabulary: Path | None = None,
     overwrite: bool = False,
+    prune: bool = False,
     paper: bool = False,
     jobs: int | None = None,
 ) -> tuple[Codes, tuple[Failure, ...]]:
@@ -146,6 +162,8 @@ def encode_paths(
         Model or codes to reuse.
     overwrite
         Whether codes that are there already are left out of account.
+    prune
+        Whether shapes whose files are gone from `paths` are dropped from the codes.
     paper
         Whether settings that were not asked for are those of the paper.
     jobs
@@ -198,13 +216,33 @@ def encode_paths(
             )
             failures = codes.failures
             if known is not None:
-                codes = merge(known, codes)
+                codes = merge(_present(known, paths, output, prune=prune), codes)
             codes.save(output)
+        except ReadError as error:
+            if error.failures:
+                # nothing was done that another run could go on from
+                clear_work(work)
+            raise
         except KeyboardInterrupt:
             msg = f"interrupted; what is done is kept in {work}: give the same command again to go on"
             raise KeyboardInterrupt(msg) from None
     clear_work(work)
     return codes, failures
+
+
+def _present(codes: Codes, paths: list[str], output: Path, *, prune: bool) -> Codes:
+    """Tell how many shapes are gone from the paths; drop them if that is asked."""
+    from spem.codes.collection import missing
+
+    gone = set(missing(codes, paths))
+    if gone and not prune:
+        verb, them = ("is", "it") if len(gone) == 1 else ("are", "them")
+        where = f"of {output} {verb} no longer in {', '.join(paths)}"
+        complain(f"{counted(len(gone), 'shape')} {where}; --prune removes {them}")
+    if not gone or not prune:
+        return codes
+    complain(f"removed {counted(len(gone), 'shape')} no longer in {', '.join(paths)}")
+    return replace(codes.take([row for row in range(len(codes)) if row not in gone]), failures=codes.failures)
 
 
 def load_model(path: Path) -> Model:

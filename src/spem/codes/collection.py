@@ -23,6 +23,7 @@ from spem.codes.sources import Source, as_source, read_shapes, source_name, sour
 from spem.codes.work import Entry, Work, dimension
 from spem.codes.workers import one_line, run_all
 from spem.errors import ModelError, ParameterError, ReadError, ShapeError, SpemError
+from spem.shapes.kinds import SUFFIXES, has_suffix
 from spem.shapes.shape import Shape
 
 # Training shapes beyond these change the vocabulary by less than another seed does; they bound the memory.
@@ -174,6 +175,30 @@ def merge(existing: Codes, new: Codes) -> Codes:
     stays = existing.take([i for i, path in enumerate(existing.paths) if _place(path) not in given])
     failures = tuple(failure for failure in existing.failures if _place(failure.path) not in given)
     return replace(stays, failures=failures).join(new)
+
+
+def missing(codes: Codes, paths: Sequence[str | Path]) -> list[int]:
+    """Return the rows of codes whose files were in these folders, and are no longer there.
+
+    Parameters
+    ----------
+    codes
+        The codes.
+    paths
+        Folders; anything else leads to nothing.
+
+    Examples
+    --------
+    >>> square = Shape.from_mask(np.ones((9, 9)))
+    >>> codes = encode_collection([square], Settings(voxels=None, n_maps=2, n_centers=4))
+    >>> missing(replace(codes, paths=("gone.png",)), ["."])
+    [0]
+    """
+    roots = [Path(path).resolve() for path in paths if Path(path).is_dir()]
+    # a shape that was no file has its name for a path
+    places = {row: _place(path) for row, path in enumerate(codes.paths) if has_suffix(Path(path), SUFFIXES)}
+    below = (row for row, place in places.items() if any(place.is_relative_to(root) for root in roots))
+    return [row for row in below if not places[row].exists()]
 
 
 def _place(path: str) -> Path:
