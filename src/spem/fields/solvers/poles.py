@@ -62,19 +62,20 @@ class Targets:
     def next(self, poles: Small, lowest: float, highest: float) -> Small:
         """Eight more shifts, where the rational interpolant's ∏|σ - σₚ|/(σ + σₚ) is largest in turn (Leja).
 
-        `lowest` and `highest` bound the eigenvalues that count. The largest shift, where fields vary fastest,
-        is always among the eight: what single precision left of its error shows nowhere else.
+        `lowest` and `highest` bound the eigenvalues that count. After two blocks, the largest shift, where
+        fields vary fastest, is among the eight: what is left of its own error shows nowhere else.
         """
         if self.few is not None:
             return self.few
         candidates, chosen = self.dense(lowest, highest), list(poles)
         spread = _spread(candidates, lowest, highest)
-        for _ in range(LANES - 1):
+        again = poles.size > LANES
+        for _ in range(LANES - again):
             taken = _spread(np.array(chosen), lowest, highest)
             distance = np.abs(np.subtract.outer(spread, taken))
             ratio = distance / np.add.outer(spread, taken) + np.finfo(float).tiny
             chosen.append(candidates[int(np.argmax(np.log(ratio).sum(axis=1)))])
-        return np.array([*chosen[1 - LANES :], candidates[-1]])
+        return np.array([*chosen[poles.size :], *candidates[-1:]] if again else chosen[poles.size :])
 
 
 def _spread(shifts: Small, lowest: float, highest: float) -> Small:
