@@ -92,6 +92,17 @@ def test_files_that_are_gone_are_told_and_pruned(spem: Spem, folder: Path, codes
     assert set(Codes.load(codes).names) == set(names) - {"long1"}
 
 
+def test_links_that_lead_nowhere_and_hidden_files(spem: Spem, folder: Path, tmp_path: Path) -> None:
+    """A dangling link is a failure; hidden files are left out, and counted."""
+    (folder / "lost.npy").symlink_to(folder / "nowhere.npy")
+    np.save(folder / ".hidden.npy", ellipse(5, 9))
+    result = spem("encode", folder, "-o", tmp_path / "c.spem", *QUICK)
+    assert result.exit_code == 1
+    first, second = result.stderr.splitlines()
+    assert first == "spem: 1 hidden file left out; give such files by name"
+    assert second.endswith("lost.npy: no such file; check the path")
+
+
 def test_no_folder_is_left_of_nothing(spem: Spem, folder: Path, tmp_path: Path) -> None:
     """Wrong settings, and files of which none can be read, leave neither a folder nor work."""
     before = set(tmp_path.rglob("*"))

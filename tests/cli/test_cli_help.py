@@ -13,7 +13,8 @@ from typer.testing import Result
 
 import spem as package
 from spem.cli.options import BoundaryChoice, ComponentsChoice, SchemeChoice
-from spem.codes.settings import Components
+from spem.codes.normalise import Scaling
+from spem.codes.settings import Components, Settings
 from spem.fields.operator import Boundary
 from spem.fields.rho import Scheme
 
@@ -54,6 +55,14 @@ def test_help_names_all_commands(spem: Callable[..., Result]) -> None:
 def test_choices_are_those_of_the_library(choice: type[StrEnum], kind: object) -> None:
     """The command line, which loads no solver for its help, offers what the library takes."""
     assert tuple(choice) == get_args(kind)
+
+
+def test_defaults_of_codes_are_shown(spem: Callable[..., Result]) -> None:
+    """The help of `encode` has the defaults and choices of the settings."""
+    text, default = " ".join(spem("encode", "--help").stdout.split()), Settings()
+    for name in ("n_maps", "n_centers", "power", "moments", "scaling"):
+        assert f"[{getattr(default, name)}]" in text.split(f"--{name.replace('_', '-')} ")[1][:140]
+    assert ", ".join(get_args(Scaling)[:-1]) in text
 
 
 def test_version(spem: Callable[..., Result]) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spem.codes.codes import Codes, Failure, file_hash
-from spem.codes.container import write_container
+from spem.codes.container import read_container, write_container
 from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.errors import ModelError, ParameterError, ReadError
@@ -77,6 +77,26 @@ def test_file_without_vectors_and_model_files_are_refused(tmp_path):
     codes.model.save(tmp_path / "m")
     with pytest.raises(ReadError, match="is a file of spem model, expected spem codes"):
         Codes.load(tmp_path / "m")
+
+
+@pytest.mark.parametrize(
+    ("header", "arrays"),
+    [
+        ({}, {"vectors": np.full((3, 12), np.nan, np.float32)}),
+        ({}, {"vectors": np.zeros((3, 12), complex)}),
+        ({"names": [1, 2, 3]}, {}),
+        ({"paths": None}, {}),
+        ({"paths": [1, 2, 3]}, {}),
+        ({"failures": [["a"]]}, {}),
+    ],
+)
+def test_whole_files_of_wrong_contents_are_refused(tmp_path, header, arrays):
+    """A file whose hash fits may still hold what no code is."""
+    make().save(tmp_path / "c")
+    good_header, good_arrays = read_container(tmp_path / "c", "codes")
+    write_container(tmp_path / "c", "codes", good_header | header, good_arrays | arrays)
+    with pytest.raises(ReadError, match="not whole codes"):
+        Codes.load(tmp_path / "c")
 
 
 def test_no_shape_at_all_is_a_collection_too(tmp_path):

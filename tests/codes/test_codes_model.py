@@ -94,6 +94,13 @@ def test_model_that_lacks_an_array_is_refused(model, tmp_path):
         Model.load(tmp_path / "m.spem")
 
 
+def test_settings_that_are_no_table_are_refused(model, tmp_path):
+    """A whole file whose settings are a list is refused."""
+    write_container(tmp_path / "m.spem", "model", {"settings": [1]}, model.to_arrays())
+    with pytest.raises(ModelError, match="no table of names and values"):
+        Model.load(tmp_path / "m.spem")
+
+
 def test_truncated_model_is_refused(model, tmp_path):
     """Half a file is not a model."""
     path = tmp_path / "m.spem"

@@ -46,6 +46,7 @@ def test_settings_survive_json():
         ({"moments": 0}, "moments=0 must be a whole number from 1 to 2"),
         ({"scheme": "cubic"}, "must be one of linear, squared, log"),
         ({"power": -0.1}, "must lie in"),
+        ({"code_format": 9}, "code_format=9: this spem makes format"),
     ],
 )
 def test_settings_out_of_range_are_refused(bad, message):

@@ -58,11 +58,21 @@ def encode(
     ] = None,
     n_rho: Annotated[int | None, typer.Option(min=1, help="Number of ρ in each range. [64]")] = None,
     rho_scheme: Annotated[SchemeChoice | None, typer.Option(help="How ρ is spread. [linear]")] = None,
-    n_maps: Annotated[int | None, typer.Option(min=1, help="Maps of each range.")] = None,
-    n_centers: Annotated[int | None, typer.Option(min=1, help="Centres of the vocabulary.")] = None,
-    power: Annotated[float | None, typer.Option(help="Exponent of the residuals, α of (5.3).")] = None,
-    scaling: Annotated[str | None, typer.Option(metavar="KIND", help="How maps are made comparable.")] = None,
-    moments: Annotated[int | None, typer.Option(help="Moments of the residuals in a code, 1 or 2.")] = None,
+    n_maps: Annotated[int | None, typer.Option(min=1, help="Maps of each range. [8]")] = None,
+    n_centers: Annotated[int | None, typer.Option(min=1, help="Centres of the vocabulary. [64]")] = None,
+    power: Annotated[
+        float | None, typer.Option(help="Exponent of the residuals, α of (5.3), 0 to 1. [0.5]")
+    ] = None,
+    scaling: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="How maps are made comparable: standard, whiten, deviation or none. [standard]",
+        ),
+    ] = None,
+    moments: Annotated[
+        int | None, typer.Option(help="Moments of the residuals in a code, 1 or 2. [2]")
+    ] = None,
     drop_boundary: Annotated[
         bool | None, typer.Option("--drop-boundary/--keep-boundary", help="Leave out nodes at the boundary.")
     ] = None,
@@ -185,11 +195,14 @@ def encode_paths(
     """
     from spem.codes.codes import Codes
     from spem.codes.collection import encode_collection, merge
-    from spem.codes.sources import find_files
+    from spem.codes.sources import count_hidden, find_files
     from spem.codes.work import clear_work
     from spem.codes.workers import count_processes
     from spem.shapes.kinds import kind_of
 
+    hidden = count_hidden(paths)
+    if hidden:
+        complain(f"{counted(hidden, 'hidden file')} left out; give such files by name")
     files = [path for path in find_files(paths) if path.absolute() != output.absolute()]
     if overwrite and output.exists() and kind_of(output):
         msg = f"{output}: is {kind_of(output)}, not spem codes; write to another file"

@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,13 +163,24 @@ class Codes:
             folder = Path(path).parent
             paths = tuple(found_path(each, folder) for each in stored)
             failures = tuple(Failure(found_path(each, folder), reason) for each, reason in header["failures"])
+            _check_contents(arrays["vectors"], (*names, *stored, *hashes))
             return cls(names, paths, hashes, arrays["vectors"], model, failures)
-        except (KeyError, TypeError, ParameterError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
             msg = f"{path}: not whole codes ({error}); make it again"
             raise ReadError(msg) from error
 
     def __repr__(self) -> str:
         return f"Codes({len(self)} shapes, {len(self.failures)} failures, {self.model!r})"
+
+
+def _check_contents(vectors: NDArray[Any], texts: Sequence[Any]) -> None:
+    """Refuse what no code and no name is, since the hash of a file vouches for its bytes alone."""
+    if vectors.dtype.kind != "f" or not np.isfinite(vectors).all():
+        msg = "vectors that are no finite numbers"
+        raise TypeError(msg)
+    if not all(isinstance(text, str) for text in texts):
+        msg = "names, paths or hashes that are no text"
+        raise TypeError(msg)
 
 
 def file_hash(path: str | os.PathLike[str]) -> str:

@@ -165,7 +165,11 @@ class Model:
         cls, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], source: str, prefix: str = ""
     ) -> Self:
         """Make a model of what `to_header` and `to_arrays` gave."""
-        checked = Settings.from_json(header.get("settings", {}), source)
+        values = header.get("settings", {})
+        if not isinstance(values, Mapping):
+            msg = f"{source}: the settings are no table of names and values; make it again"
+            raise ModelError(msg)
+        checked = Settings.from_json(values, source)
         bands = range(len(checked.rho_ranges))
         try:
             normalisations = tuple(

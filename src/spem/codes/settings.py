@@ -114,6 +114,9 @@ class Settings:
             if getattr(self, name) not in get_args(kind):
                 msg = f"{name}={getattr(self, name)!r} must be one of {', '.join(get_args(kind))}"
                 raise ParameterError(msg)
+        if self.code_format != CODE_FORMAT:
+            msg = f"code_format={self.code_format!r}: this spem makes format {CODE_FORMAT}; leave it out"
+            raise ParameterError(msg)
         if not 0 <= self.power <= 1:
             msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"
             raise ParameterError(msg)

@@ -81,6 +81,18 @@ def find_files(paths: Iterable[str | Path]) -> list[Path]:
     return list(found)
 
 
+def count_hidden(paths: Iterable[str | Path]) -> int:
+    """Return how many files of a known kind `find_files` leaves out of folders because they are hidden.
+
+    Examples
+    --------
+    >>> count_hidden(["no-such-folder"])
+    0
+    """
+    folders = [Path(path) for path in paths if str(path) and Path(path).is_dir()]
+    return sum(_hidden(path, folder) for folder in folders for path in _shapes_below(folder))
+
+
 def as_source(source: str | Path | Shape) -> Source:
     """Return a path or a shape."""
     return source if isinstance(source, Shape) else Path(source)
@@ -188,6 +200,15 @@ def _resampled(shape: Shape, settings: Settings) -> Shape | SpemError:
 
 
 def _walk(folder: Path) -> list[Path]:
-    """List the files of a known kind below a folder, without hidden ones."""
-    inside = (path for path in folder.rglob("*") if path.is_file() and has_suffix(path, SUFFIXES))
-    return sorted(p for p in inside if not any(part.startswith(".") for part in p.relative_to(folder).parts))
+    """List the files of a known kind below a folder, without hidden ones; links that lead nowhere too."""
+    return sorted(path for path in _shapes_below(folder) if not _hidden(path, folder))
+
+
+def _shapes_below(folder: Path) -> Iterator[Path]:
+    """Yield the files of a known kind below a folder."""
+    return (path for path in folder.rglob("*") if has_suffix(path, SUFFIXES) and not path.is_dir())
+
+
+def _hidden(path: Path, folder: Path) -> bool:
+    """Tell whether a file, or a folder on the way to it, is hidden."""
+    return any(part.startswith(".") for part in path.relative_to(folder).parts)
