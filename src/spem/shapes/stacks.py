@@ -177,7 +177,7 @@ def _npz(path: Path, check: _Check) -> Stack:
         d = array.ndim
         spacing = archive["spacing"] if "spacing" in archive.files else np.ones(d)
         origin = archive["origin"] if "origin" in archive.files else np.zeros(d)
-        note = () if len(names) == 1 else (f"array {chosen!r} of {len(names)}",)
+        note: tuple[str, ...] = () if len(names) == 1 else (f"array {chosen!r} of {len(names)}",)
         note += ("spacing from the file",) if "spacing" in archive.files else ()
     stack = Stack(array, (1.0,) * d, _per_axis(origin, d, path, "origin"), path.stem, str(path), notes=note)
     return stack.with_spacing(_per_axis(spacing, d, path, "spacing"), str(path))
