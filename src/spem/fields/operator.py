@@ -38,8 +38,8 @@ class System:
         ``(n_nodes,)`` diagonal of A.
     mass
         ``(n_nodes,)`` diagonal of M: mean over the axes of the half length of the two edges of each node, in
-        edges. An edge that is cut short holds less of the screening. In 1-D this is the scheme of Shortley and Weller; in general it
-        halves the error that the identity would leave, at the same order.
+        edges. An edge that is cut short holds less of the screening. In 1-D this is the scheme of Shortley
+        and Weller; in general it halves the error that the identity would leave, at the same order.
     boundary
         The boundary model.
     """
