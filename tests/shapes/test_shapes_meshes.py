@@ -119,6 +119,30 @@ def test_open_mesh_is_filled_by_winding_number_and_says_so() -> None:
     assert np.allclose(line_volumes(shape), BALL.volume, rtol=5e-3)
 
 
+def test_fin_on_a_closed_mesh_is_told_and_adds_nothing() -> None:
+    """An edge of three faces is not manifold: the winding number fills the box, and the report says so."""
+    box = trimesh.creation.box((1, 1, 1))
+    vertices = np.vstack([box.vertices, [[0, 0, 2]]])
+    faces = np.vstack([box.faces, [[*box.edges_unique[0], 8]]])
+    shape = mesh_shape(vertices, faces, voxels=1000)
+    assert shape.report.method == "generalised winding number"
+    assert shape.report.watertight is False
+    assert shape.report.repairs == ("filled over 3 open edges in 1 loop",)
+    assert np.allclose(shape.volume, 1.0, rtol=0.01)
+
+
+def test_boxes_that_share_an_edge_are_closed() -> None:
+    """An edge of four faces whose directions balance leaves nothing open: scanlines fill both boxes."""
+    boxes = [trimesh.creation.box((1, 1, 1)) for _ in range(2)]
+    boxes[1].apply_translation((1, 1, 0))
+    both = trimesh.util.concatenate(boxes)
+    both.merge_vertices()
+    shape = mesh_shape(both.vertices, both.faces, voxels=1000, components="all")
+    assert shape.report.method == "scanline filling"
+    assert shape.report.watertight is True
+    assert shape.report.components == 2
+
+
 def test_vertices_repeated_for_each_face_are_closed() -> None:
     """A triangle soup without shared vertices, as in STL, is watertight where corners meet."""
     soup = BALL.vertices[BALL.faces].reshape(-1, 3)

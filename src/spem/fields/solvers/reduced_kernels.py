@@ -55,7 +55,7 @@ def cross_operator(
     first: int,
     stride: int,
 ) -> None:
-    """Write ``block.T @ A @ other``, ``block.T @ M @ other`` and the column sums of the latter's factor."""
+    """Write ``block.T @ A @ other`` and ``block.T @ M @ other``, the column sums of ``M @ other`` last."""
     for slab in range(first, slabs.size - 1, stride):
         stiff, heavy = partial[slab, 0], partial[slab, 1]
         stiff[:] = 0

@@ -89,16 +89,19 @@ class Sweep:
     def solve(self, system: System, rho: NDArray[np.float64]) -> Solution:
         """Solve for each ρ; the residual is an estimate, from the true residual, of the largest error."""
         field, residual, spent, converged = self._run(system, rho, between=False)
-        advice = f"raise rtol={self.rtol:g}, or solve directly"
-        return Solution(field.fields(), np.full(rho.size, residual), converged, spent, advice)
+        return Solution(field.fields(), np.full(rho.size, residual), converged, spent, self._advice)
 
     def hyperfield(self, system: System, rho: NDArray[np.float64]) -> Hyperfield:
         """Low-rank hyperfield over the range of `rho`; raises `ConvergenceError` if it misses `rtol`."""
         field, residual, spent, converged = self._run(system, rho, between=True)
         if not converged:
-            advice = f"raise rtol={self.rtol:g}, or solve directly"
-            Solution(field.at(rho[:1]), np.array([residual]), False, spent, advice).checked(system.shape.name)
+            best = Solution(field.at(rho[:1]), np.array([residual]), False, spent, self._advice)
+            best.checked(system.shape.name)
         return field
+
+    @property
+    def _advice(self) -> str:
+        return f"raise rtol={self.rtol:g}, or solve directly"
 
     def _run(
         self, system: System, rho: NDArray[np.float64], *, between: bool
