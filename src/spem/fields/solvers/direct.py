@@ -39,7 +39,7 @@ class Direct:
 
     rtol: float = 1e-10
 
-    def factorize(self, system: System, shift: float) -> Any:
+    def prepare(self, system: System, shift: float) -> Any:
         """Factor A + shift·M; the result's ``solve`` takes any number of right-hand sides as columns."""
         return scipy.sparse.linalg.splu(
             system.matrix(shift).tocsc(),
@@ -50,7 +50,7 @@ class Direct:
 
     def solve(self, system: System, rho: NDArray[np.float64]) -> Solution:
         """Factor and solve for each ρ; the residual is ‖b - (A + M/ρ²) v‖ / ‖b‖."""
-        columns = [self.factorize(system, 1.0 / r**2).solve(system.rhs) for r in rho]
+        columns = [self.prepare(system, 1.0 / r**2).solve(system.rhs) for r in rho]
         values = np.stack(columns, axis=1)
         residual = relative_residual(system, values, rho)
         converged = bool(np.all(residual <= self.rtol))

@@ -1,0 +1,1 @@
+"""Parts: interaction vectors of boundary sources, their readings, and their non-negative decomposition."""
