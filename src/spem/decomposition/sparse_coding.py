@@ -1,0 +1,196 @@
+"""Non-negative sparse coding (4.3) as a scikit-learn estimator."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+import scipy.sparse
+from numpy.random import RandomState
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, ClassNamePrefixFeaturesOutMixin, TransformerMixin
+from sklearn.utils import check_random_state
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from spem.decomposition.coding_descent import Coding, descend, encode
+from spem.decomposition.coding_starts import STARTS, Start, row_squares, start_atoms
+from spem.errors import ParameterError
+
+
+def largest_sparsity(X: Any) -> float:
+    """Return the λ at and above which all codes of (4.3) vanish: the largest norm of a sample.
+
+    A code a·y − λ of sample y on an atom a of the unit ball can be positive only below ‖y‖.
+
+    Examples
+    --------
+    >>> largest_sparsity(np.array([[3.0, 4.0], [1.0, 0.0]]))
+    5.0
+    """
+    return float(np.sqrt(row_squares(X).max(initial=0.0)))
+
+
+class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  # type: ignore[misc]
+    """Few non-negative atoms of the unit ball, and sparse non-negative codes on them (4.3).
+
+    Minimises ½‖X − CD‖² + λ ΣC over codes C ≥ 0 and atoms D ≥ 0 with rows of norm at most 1; with Y = Xᵀ,
+    A = Dᵀ and S = Cᵀ this is (4.3). λ = 0 is non-negative matrix factorisation.
+
+    Parameters
+    ----------
+    n_components
+        Number k of atoms.
+    sparsity
+        λ, in the unit of the samples' norms; `largest_sparsity` is the limit at which all codes vanish.
+    init
+        How starts are chosen, ``"farthest"``, ``"k-means++"`` or ``"random"``, or ``(≤ k, n_features)``
+        atoms to start from; missing ones are added by ``"k-means++"``.
+    n_init
+        Number of starts; the one of least objective is kept.
+    max_iter
+        Most outer iterations of one start.
+    tol
+        Share of the objective by which five outer iterations must lower it to go on.
+    random_state
+        Seed or generator of the starts.
+
+    Attributes
+    ----------
+    components_
+        ``(k, n_features)`` atoms D, of unit norm; zero only if nothing is left to explain.
+    objective_
+        Objective of the codes that `fit_transform` returns.
+    objective_path_
+        ``(n_iter_,)`` objective after each outer iteration of the best start; never rises.
+    reconstruction_err_
+        ‖X − CD‖.
+    n_iter_
+        Number of outer iterations of the best start.
+    converged_
+        Whether the best start met `tol` within `max_iter`.
+    n_features_in_
+        Number of features seen by `fit`.
+
+    Examples
+    --------
+    >>> X = np.array([[2.0, 0.0], [4.0, 0.0], [0.0, 3.0]])
+    >>> coder = NonnegativeSparseCoding(2, sparsity=0.5, random_state=0)
+    >>> coder.fit_transform(X).round(6)[:, np.argsort(coder.components_[:, 1])]
+    array([[1.5, 0. ],
+           [3.5, 0. ],
+           [0. , 2.5]])
+    """
+
+    def __init__(
+        self,
+        n_components: int = 8,
+        sparsity: float = 0.0,
+        *,
+        init: Start | ArrayLike = "k-means++",
+        n_init: int = 4,
+        max_iter: int = 500,
+        tol: float = 1e-5,
+        random_state: int | RandomState | None = None,
+    ) -> None:
+        self.n_components = n_components
+        self.sparsity = sparsity
+        self.init = init
+        self.n_init = n_init
+        self.max_iter = max_iter
+        self.tol = tol
+        self.random_state = random_state
+
+    def fit(self, X: ArrayLike, y: Any = None) -> Self:
+        """Find atoms for the samples ``X`` of shape ``(n_samples, n_features)``; `y` is ignored."""
+        self.fit_transform(X)
+        return self
+
+    def fit_transform(self, X: ArrayLike, y: Any = None) -> NDArray[np.float64]:
+        """Find atoms and return the codes ``(n_samples, k)`` of the samples; `y` is ignored."""
+        samples = self._samples(X, reset=True)
+        self._check_parameters(samples)
+        random = check_random_state(self.random_state)
+        coding = min((self._run(samples, random) for _ in range(self.n_init)), key=lambda c: c.path[-1])
+        self.components_ = coding.atoms
+        self.objective_path_ = coding.path
+        self.objective_ = float(coding.path[-1])
+        self.n_iter_ = len(coding.path)
+        self.converged_ = coding.converged
+        penalty = self.sparsity * coding.codes.sum()
+        self.reconstruction_err_ = float(np.sqrt(max(2 * (self.objective_ - penalty), 0)))
+        return coding.codes
+
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Return the codes ``(n_samples, k)`` of samples: the exact non-negative lasso on the atoms."""
+        check_is_fitted(self)
+        return encode(self._samples(X, reset=False), self.components_, self.sparsity)
+
+    def inverse_transform(self, codes: ArrayLike) -> NDArray[np.float64]:
+        """Return the samples ``(n_samples, n_features)`` that codes ``(n_samples, k)`` stand for, CD."""
+        check_is_fitted(self)
+        C = np.asarray(codes, np.float64)
+        k = len(self.components_)
+        if C.ndim != 2 or C.shape[1] != k:
+            msg = f"codes have the shape {C.shape}; expected (n_samples, {k}), as transform returns them"
+            raise ParameterError(msg)
+        return np.asarray(C @ self.components_)
+
+    def _run(self, samples: Any, random: RandomState) -> Coding:
+        """Descend from one start."""
+        rule: Start = "k-means++"
+        known = np.empty((0, samples.shape[1]))
+        if isinstance(self.init, str):
+            rule = self.init  # type: ignore[assignment]
+        else:
+            known = np.asarray(self.init, np.float64)
+        atoms = start_atoms(samples, known, self.n_components, rule, random)
+        return descend(samples, atoms, self.sparsity, self.max_iter, self.tol)
+
+    def _samples(self, X: ArrayLike, *, reset: bool) -> Any:
+        """Check samples; return a float64 array or CSR matrix."""
+        samples = validate_data(
+            self, X, accept_sparse="csr", dtype=np.float64, ensure_all_finite=False, reset=reset
+        )
+        data = samples.data if scipy.sparse.issparse(samples) else samples
+        low, high = (data.min(), data.max()) if data.size else (0.0, 0.0)
+        if low >= 0 and high < np.inf:
+            return samples
+        if low < 0:
+            msg = f"Negative values in data passed to X: {low:g}; expected finite numbers from 0 on"
+        else:
+            what = "NaN" if np.isnan(low) else "inf"
+            msg = f"X contains {what}; expected finite numbers from 0 on"
+        raise ParameterError(msg)
+
+    def _check_parameters(self, samples: Any) -> None:
+        """Check the parameters against the samples."""
+        n, p = samples.shape
+        if not 1 <= self.n_components <= min(n, p):
+            msg = (
+                f"n_components={self.n_components}: expected 1 to {min(n, p)}, no more than "
+                f"n_samples={n} or n_features={p}"
+            )
+            raise ParameterError(msg)
+        if not 0 <= self.sparsity < np.inf:
+            msg = f"sparsity={self.sparsity}: expected a finite number from 0 on"
+            raise ParameterError(msg)
+        largest = largest_sparsity(samples)
+        if self.sparsity > 0 and self.sparsity >= largest:
+            msg = (
+                f"sparsity={self.sparsity:g}: all codes vanish; "
+                f"expected less than {largest:.6g}, the largest norm of a sample"
+            )
+            raise ParameterError(msg)
+        if isinstance(self.init, str) and self.init not in STARTS:
+            msg = f"init={self.init!r}: expected one of {', '.join(map(repr, STARTS))}, or atoms"
+            raise ParameterError(msg)
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.input_tags.positive_only = True
+        tags.input_tags.sparse = True
+        return tags
+
+    @property
+    def _n_features_out(self) -> int:
+        return len(self.components_)
