@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path
-from skimage.measure import find_contours
 
-from spem.errors import ParameterError, ShapeError
+from spem.errors import ParameterError
 from spem.plots.extension import extend_values
 from spem.plots.level import surface_level
+from spem.plots.plane import clip_to, contour_lines, extent, frame, require_dimension
 from spem.plots.style import COLOURS, FIELD_CMAP, INK, MAP_CMAP, bare, framed
 from spem.plots.values import node_values, value_limits
 
@@ -75,7 +73,7 @@ def draw_values(
     >>> draw_values(Shape.from_mask(np.ones((2, 3))), range(6), ax).get_extent()
     [-1.5, 3.5, 2.5, -1.5]
     """
-    _require_dimension(shape, 2, "an image")
+    require_dimension(shape, 2, "an image")
     nodal = node_values(shape, values)
     level = surface_level(shape)
     grid = extend_values(shape, nodal, level, boundary=boundary)
@@ -85,7 +83,7 @@ def draw_values(
         lines = [
             line
             for value in np.linspace(*ends, CONTOURS + 2)[1:-1]
-            for line in _contour_lines(shape, grid, float(value), (0, 1))
+            for line in contour_lines(shape, grid, float(value))
         ]
         drawn = LineCollection(lines, colors="white", linewidths=0.5, alpha=0.75)
         ax.add_collection(drawn)
@@ -118,15 +116,15 @@ def draw_outline(shape: Shape, ax: Axes, *, colour: str = INK, width: float = 1.
     >>> len(draw_outline(Shape.from_mask(np.ones((4, 4))), ax).get_paths())
     1
     """
-    _require_dimension(shape, 2, "an outline")
+    require_dimension(shape, 2, "an outline")
     lines = LineCollection(
-        _contour_lines(shape, surface_level(shape), 0.0, (0, 1)),
+        contour_lines(shape, surface_level(shape)),
         colors=colour,
         linewidths=width,
         capstyle="round",
     )
     ax.add_collection(lines)
-    _frame_grid(shape, (0, 1), ax)
+    frame(shape, ax)
     return lines
 
 
@@ -172,7 +170,7 @@ def draw_slice(
     >>> draw_slice(Shape.from_mask(np.ones((3, 3, 3))), np.ones(27), ax, axis=0).get_array().shape
     (5, 5)
     """
-    _require_dimension(shape, 3, "a slice")
+    require_dimension(shape, 3, "a slice")
     nodal = node_values(shape, values)
     if axis not in (0, 1, 2):
         msg = f"{shape.name}: axis must be 0, 1 or 2, not {axis}"
@@ -216,18 +214,11 @@ def draw_line(shape: Shape, values: ArrayLike, ax: Axes, *, colour: str = COLOUR
     >>> draw_line(Shape.from_mask([1, 1, 1]), [1, 2, 1], ax).get_ydata().tolist()
     [nan, 1.0, 2.0, 1.0, nan]
     """
-    _require_dimension(shape, 1, "a curve over positions")
+    require_dimension(shape, 1, "a curve over positions")
     grid = shape.to_grid(node_values(shape, values))
     position = shape.origin[0] + shape.spacing[0] * np.arange(grid.size)
     framed(ax, "position", "")
     return ax.plot(position, grid, color=colour, linewidth=1.4)[0]
-
-
-def _require_dimension(shape: Shape, wanted: int, what: str) -> None:
-    """Raise unless the shape has the dimension that a picture needs."""
-    if shape.ndim != wanted:
-        msg = f"{shape.name}: {what} is drawn of a shape of {wanted} dimensions, this one has {shape.ndim}"
-        raise ShapeError(msg)
 
 
 def _draw_grid(
@@ -241,37 +232,15 @@ def _draw_grid(
 ) -> AxesImage:
     """Draw a plane of the grid with its first axis down, as far as its level is positive."""
     low, high = limits
-    extent = _extent(shape, axes)
     image = ax.imshow(
-        grid, cmap=cmap, vmin=low, vmax=high, extent=extent, interpolation="bilinear", aspect="equal"
+        grid,
+        cmap=cmap,
+        vmin=low,
+        vmax=high,
+        extent=extent(shape, axes),
+        interpolation="bilinear",
+        aspect="equal",
     )
-    # Lines around holes run the other way than those around parts, so holes stay clear.
-    lines = _contour_lines(shape, level, 0.0, axes)
-    path = Path.make_compound_path(*map(Path, lines)) if lines else Path(np.empty((0, 2)))
-    image.set_clip_path(PathPatch(path, transform=ax.transData))
+    clip_to(image, ax, contour_lines(shape, level, 0.0, axes))
     bare(ax)
     return image
-
-
-def _extent(shape: Shape, axes: tuple[int, int]) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top edge of the grid, half a voxel beyond its outermost centres."""
-    start = [shape.origin[a] - shape.spacing[a] / 2 for a in axes]
-    stop = [b + shape.mask.shape[a] * shape.spacing[a] for a, b in zip(axes, start, strict=True)]
-    return start[1], stop[1], stop[0], start[0]
-
-
-def _frame_grid(shape: Shape, axes: tuple[int, int], ax: Axes) -> None:
-    """Set the limits of an axis to the grid, its first axis down."""
-    left, right, bottom, top = _extent(shape, axes)
-    ax.set_xlim(left, right)
-    ax.set_ylim(bottom, top)
-    ax.set_aspect("equal")
-    bare(ax)
-
-
-def _contour_lines(
-    shape: Shape, grid: NDArray[np.float64], level: float, axes: tuple[int, int]
-) -> list[NDArray[np.float64]]:
-    """Polylines (x, y) of a level of a plane of the grid, in the shape's coordinates."""
-    start, step = (np.array([whole[a] for a in axes]) for whole in (shape.origin, shape.spacing))
-    return [(start + line * step)[:, ::-1] for line in find_contours(grid, level)]

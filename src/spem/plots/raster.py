@@ -15,6 +15,7 @@ from spem.plots.camera import Camera
 from spem.plots.style import FIELD_CMAP, SOLID
 
 if TYPE_CHECKING:
+    from matplotlib.colors import Colormap
     from numpy.typing import ArrayLike, NDArray
 
     from spem.plots.camera import View
@@ -60,9 +61,10 @@ def render_surface(
     *,
     view: View = (20.0, -60.0),
     size: tuple[int, int] = (320, 320),
-    cmap: str = FIELD_CMAP,
+    cmap: str | Colormap = FIELD_CMAP,
     limits: tuple[float, float] | None = None,
     colour: str = SOLID,
+    face_colours: ArrayLike | None = None,
     unlit: ArrayLike | None = None,
 ) -> NDArray[np.uint8]:
     """Draw a triangle mesh, shaded by two soft lights, on a transparent ground.
@@ -86,6 +88,8 @@ def render_surface(
         Values at the two ends of the colour map; the smallest and largest value by default.
     colour
         Colour where there are no values.
+    face_colours
+        ``(n_faces, 3)`` red, green and blue of each face, 0 to 1, in place of values.
     unlit
         ``(n_faces,)`` True where a face has the very colour of its values, without light or shade.
 
@@ -97,7 +101,7 @@ def render_surface(
     Raises
     ------
     ParameterError
-        If the arrays do not make a mesh.
+        If the arrays do not make a mesh, or there is not one colour for each face.
 
     Examples
     --------
@@ -118,12 +122,14 @@ def render_surface(
     seen = face >= 0
     part, share = triangle[face[seen]], weight[seen]  # (n_seen, 3), (n_seen, 3)
     normal = _seen_normals(corner, triangle, camera.rotation, face[seen], share)
-    if values is None:
+    if face_colours is not None:
+        rgb = _face_colours(face_colours, len(triangle))[face[seen]]
+    elif values is None:
         rgb = np.broadcast_to(to_rgb(colour), normal.shape)
     else:
         low, high = limits or (float(values.min()), float(values.max()))
         level = (np.einsum("nk,nk->n", share, values[part]) - low) / max(high - low, 1e-300)
-        rgb = mpl.colormaps[cmap](np.clip(level, 0, 1))[:, :3]
+        rgb = mpl.colormaps.get_cmap(cmap)(np.clip(level, 0, 1))[:, :3]
     light = _light(normal) - _crease(height, seen, max(fine))
     if unlit is not None:
         light[np.asarray(unlit, bool)[face[seen]]] = 1
@@ -152,6 +158,15 @@ def _mesh(
         msg = f"vertex_values must be ({len(corner)},), one a vertex, not {value.shape}"
         raise ParameterError(msg)
     return corner, triangle, value
+
+
+def _face_colours(face_colours: ArrayLike, n_faces: int) -> NDArray[np.float64]:
+    """Colours of the faces, checked."""
+    colours = np.asarray(face_colours, np.float64)
+    if colours.shape != (n_faces, 3):
+        msg = f"face_colours must be ({n_faces}, 3), one a face, not {colours.shape}"
+        raise ParameterError(msg)
+    return colours
 
 
 @numba.njit(cache=True)

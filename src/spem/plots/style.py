@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from PIL import Image
@@ -15,10 +16,19 @@ from spem.errors import ParameterError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
 # Okabe and Ito's palette, black last and yellow left out (too faint as a line on white).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+# Colours of parts, by label: Okabe and Ito's, then each the farthest from those before it, by the least of its
+# distances to normal, protan, deutan and tritan eyes.
+PART_COLOURS = (
+    *("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442"),
+    *("#960F3C", "#96F0A5", "#785A78", "#F0D2FF", "#1E5A4B", "#8778F0", "#784B00"),
+    *("#69784B", "#B4B478", "#4B3CA5", "#87B496", "#C31E2D", "#A5874B"),
+)
+# What no part explains.
+NO_PART = "#B9BFC6"
 DASHES = ("-", "--", "-.", ":")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 INK = "#22272e"
@@ -47,6 +57,32 @@ def new_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def part_colours(labels: ArrayLike) -> NDArray[np.float64]:
+    """Return the colour of each label; the same label has the same one everywhere.
+
+    Labels beyond the palette begin it anew; negative ones are grey.
+
+    Parameters
+    ----------
+    labels
+        ``(n,)`` whole numbers.
+
+    Returns
+    -------
+    colours
+        ``(n, 3)`` red, green and blue, 0 to 1.
+
+    Examples
+    --------
+    >>> part_colours([0, -1]).round(2).tolist()
+    [[0.0, 0.45, 0.7], [0.73, 0.75, 0.78]]
+    """
+    palette = np.array([to_rgb(colour) for colour in (*PART_COLOURS, NO_PART)])
+    number = np.asarray(labels, np.int64)
+    chosen: NDArray[np.float64] = palette[np.where(number < 0, -1, number % len(PART_COLOURS))]
+    return chosen
 
 
 def bare(ax: Axes, title: str = "") -> None:
