@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
-import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from spem.fields.operator import System
+from spem.fields.solvers.multifrontal import Factor, factorize
 from spem.fields.solvers.protocol import Solution, relative_residual
 
 
 @dataclass(frozen=True)
 class Direct:
-    """Sparse LU without pivoting, which an M-matrix does not need.
+    """Cholesky factorisation without pivoting, which an M-matrix does not need.
 
     With a non-negative right-hand side neither elimination nor substitution ever subtracts, so each entry of
-    the field is accurate in relative terms. Fill-in limits it to some 10^6 nodes in 2-D and 10^5 in 3-D.
+    the field is accurate in relative terms. Fill-in limits it: 60,000 nodes of a horse take 0.1 GB and about
+    a second, 250,000 take 0.7 GB and five, and both grow faster on bulkier shapes.
 
     Parameters
     ----------
     rtol
         Tolerance on ‖b - (A + M/ρ²) v‖ / ‖b‖, which only rounding keeps from zero.
+    memory_limit
+        Most bytes that a factorisation may take; SPEM_MEMORY_LIMIT or 2 GiB by default.
 
     Examples
     --------
@@ -37,16 +40,20 @@ class Direct:
            [0.429, 1.   ]])
     """
 
-    rtol: float = 1e-10
+    entrywise: ClassVar[bool] = True
 
-    def prepare(self, system: System, shift: float) -> Any:
-        """Factor A + shift·M; the result's ``solve`` takes any number of right-hand sides as columns."""
-        return scipy.sparse.linalg.splu(
-            system.matrix(shift).tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+    rtol: float = 1e-10
+    memory_limit: int | None = None
+
+    def prepare(self, system: System, shift: float) -> Factor:
+        """Factor A + shift·M; the result's ``solve`` takes any number of right-hand sides as columns.
+
+        Raises
+        ------
+        SizeError
+            When the factorisation would take more memory than the limit.
+        """
+        return factorize(system, shift, memory_limit=self.memory_limit)
 
     def solve(self, system: System, rho: NDArray[np.float64]) -> Solution:
         """Factor and solve for each ρ; the residual is ‖b - (A + M/ρ²) v‖ / ‖b‖."""
