@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,26 @@ class Solver(Protocol):
 
     def solve(self, system: System, rho: NDArray[np.float64]) -> Solution:
         """Fields ``(n_nodes, n_rho)`` of finite or infinite ρ > 0."""
+        ...
+
+
+class Prepared(Protocol):
+    """A + M/ρ² of one ρ, made ready for any number of right-hand sides."""
+
+    def solve(self, rhs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Solutions of right-hand sides ``(n_nodes,)`` or ``(n_nodes, k)``, in the same form."""
+        ...
+
+
+class SourceSolver(Solver, Protocol):
+    """A solver that takes right-hand sides other than b: those of single boundary sources (2.2)."""
+
+    #: Whether every entry of a solution is right in relative terms, however small, so that its logarithm is
+    #: right too; otherwise a solution is right relative to its maximum.
+    entrywise: ClassVar[bool]
+
+    def prepare(self, system: System, shift: float) -> Prepared:
+        """Make A + shift·M ready."""
         ...
 
 

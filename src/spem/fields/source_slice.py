@@ -1,0 +1,145 @@
+"""One slice of the hyperfield: boundary sources at one ρ, factored once, their fields in blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse.csgraph
+from numpy.typing import NDArray
+
+from spem.errors import ParameterError
+from spem.fields.rho import check_rho
+from spem.fields.solvers.direct import Direct
+from spem.fields.solvers.protocol import Prepared, SourceSolver
+from spem.fields.source_tails import logs, scaled, solve_tails
+from spem.fields.sources import Sources
+
+
+@dataclass(frozen=True, eq=False)
+class SourceSlice:
+    """Sources at one ρ with their matrix factored; made by `prepare_slice`.
+
+    Parameters
+    ----------
+    sources
+        The sources.
+    rho
+        The screening length, or `inf`.
+    solver
+        What the matrix was prepared by.
+    prepared
+        A + M/ρ², ready to solve.
+    """
+
+    sources: Sources
+    rho: float
+    solver: SourceSolver
+    prepared: Prepared
+
+    @cached_property
+    def reach(self) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+        """``(n_nodes,)`` component of each node; ``(n_sources, n_components)`` which ones a source touches."""
+        sources, rhs = self.sources, self.sources.rhs
+        count, component = scipy.sparse.csgraph.connected_components(sources.system.matrix(), directed=False)
+        touched = np.zeros((sources.n_sources, count), bool)
+        touched[np.repeat(np.arange(sources.n_sources), np.diff(rhs.indptr)), component[rhs.indices]] = True
+        return component, touched
+
+    def values(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Fields ``(stop - start, n_nodes)`` of consecutive sources."""
+        if self.solver.entrywise:
+            return np.asarray(np.exp(self.log(start, stop)))
+        return np.ascontiguousarray(self.prepared.solve(self.sources.rhs[:, start:stop].toarray()).T)
+
+    def log(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Logarithms of the fields, ``(stop - start, n_nodes)``; -inf in components that a source misses."""
+        require_entrywise(self.solver)
+        rhs, (component, touched) = self.sources.rhs[:, start:stop], self.reach
+        dense, exponent = scaled(rhs.toarray())
+        log, low = logs(self.prepared.solve(dense), exponent)
+        if not touched[start:stop].all():
+            apart = ~touched[start:stop, component]
+            log[apart] = -np.inf
+            low &= ~apart
+        if low.any():
+            solve_tails(self.sources.system, self._shift, self.solver, rhs, log, low)
+        return log
+
+    @property
+    def _shift(self) -> float:
+        return float(self.rho**-2.0)
+
+
+def prepare_slice(sources: Sources, rho: float, solver: SourceSolver | None = None) -> SourceSlice:
+    """Factor A + M/ρ² for the sources of its system.
+
+    Parameters
+    ----------
+    sources
+        The sources.
+    rho
+        The screening length in the unit of the spacing; `inf` for the Laplace equation.
+    solver
+        `Direct` by default.
+
+    Raises
+    ------
+    ParameterError
+        If ρ is not one positive number, or the solver takes no right-hand sides but b.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from spem.fields.operator import assemble
+    >>> from spem.fields.sources import point_sources
+    >>> from spem.shapes.shape import Shape
+    >>> sources = point_sources(assemble(Shape.from_mask(np.ones(3)), "voxel"))
+    >>> prepare_slice(sources, np.inf).values(0, 2)
+    array([[0.75, 0.5 , 0.25],
+           [0.25, 0.5 , 0.75]])
+    """
+    length = check_rho(rho)
+    shift = float(length[0]) ** -2.0 if length[0] > 1e-150 else np.inf  # whose square is a normal number
+    if length.size != 1 or not np.isfinite(shift):
+        msg = f"rho={rho}: expected one length, not negligible against the spacing, or inf"
+        raise ParameterError(msg)
+    chosen = source_solver(solver)
+    return SourceSlice(sources, float(length[0]), chosen, chosen.prepare(sources.system, shift))
+
+
+def source_solver(solver: Any = None) -> SourceSolver:
+    """Return the solver, `Direct` for None.
+
+    Raises
+    ------
+    ParameterError
+        If it takes no right-hand sides but b.
+    """
+    if solver is None:
+        return Direct()
+    if not hasattr(solver, "prepare"):
+        msg = (
+            f"solver={type(solver).__name__}: solves for the whole boundary only; for single sources use "
+            "Direct, or ConjugateGradient for plain values"
+        )
+        raise ParameterError(msg)
+    return solver  # type: ignore[no-any-return]
+
+
+def require_entrywise(solver: SourceSolver) -> None:
+    """Refuse logarithms of fields that are right only relative to their maximum.
+
+    Raises
+    ------
+    ParameterError
+        If the solver does not promise every entry.
+    """
+    if not solver.entrywise:
+        msg = (
+            f"solver={type(solver).__name__}: right only relative to each field's maximum, so logarithms of "
+            "its fields would be wrong deep inside; use Direct"
+        )
+        raise ParameterError(msg)
