@@ -64,7 +64,7 @@ def test_every_entry_is_right_along_a_thin_bar():
     v = factorize(system, 0.0).solve(rhs.ravel()).reshape(length, width, width)[:, 1, 1]
     with mp.workdps(50):
         angle = [k * mp.pi / (width + 1) for k in range(1, width + 1)]
-        mode = [[mp.sin(a) * mp.sin(b) * 2 / (width + 1) for a in angle] for b in angle]
+        mode = [[mp.sin(2 * a) * mp.sin(2 * b) * 2 / (width + 1) for a in angle] for b in angle]
         rate = [[mp.acosh(3 - mp.cos(a) - mp.cos(b)) for a in angle] for b in angle]
         exact = [
             mp.fsum(
