@@ -8,8 +8,6 @@ own. Bytes a node are what the peak of the process grew by during the sweep and 
 from __future__ import annotations
 
 import json
-import os
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import spem
+from _memory import forget_peak, peak, resident
 from _shapes import ball, meshed
 from _table import Benchmark, Row, compile_kernels, slope, timed
 from spem.shapes.creatures import creature_mesh
@@ -79,27 +78,6 @@ def make(name: str, size: int) -> Shape:
     if name == "ball":
         return ball(size)
     return meshed(*creature_mesh(name, np.random.default_rng(3)), size, name)
-
-
-def peak() -> int:
-    """Return the largest memory that this process has held, in bytes."""
-    unit = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
-
-
-def forget_peak() -> None:
-    """Let the peak start anew, where the system can: else making the shape may count as the sweep's."""
-    clear = Path("/proc/self/clear_refs")
-    if clear.is_file() and os.access(clear, os.W_OK):
-        clear.write_text("5", encoding="ascii")
-
-
-def resident() -> int:
-    """Return the memory that this process holds now, in bytes; the peak where that is not to be had."""
-    status = Path("/proc/self/statm")
-    if not status.is_file():
-        return peak()
-    return int(status.read_text(encoding="ascii").split()[1]) * resource.getpagesize()
 
 
 if __name__ == "__main__":
