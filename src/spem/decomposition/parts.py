@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spem.decomposition.measurements import Over
+from spem.errors import ParameterError
 from spem.fields.sources import Sources
 from spem.shapes.shape import Shape
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,6 +23,7 @@ class Parts:
     """Parts of one shape, of its region (4.1) or of its boundary (5.2).
 
     For the region Y ≈ A S, one column for each node; for the boundary Yᵀ ≈ A S, one column for each source.
+    Parts are numbered by size, the largest first.
 
     Parameters
     ----------
@@ -28,18 +36,18 @@ class Parts:
     components
         ``(k, n_nodes)`` rows of S for the region, ``(k, n_sources)`` for the boundary.
     basis
-        ``(k, n_sources)`` columns of A for the region, ``(k, n_nodes)`` for the boundary.
+        ``(k, n_sources)`` columns of A for the region, ``(k, n_nodes)`` for the boundary; of unit norm, or 0.
     node_labels
         ``(n_nodes,)`` part of each node, -1 where no component explains it.
     source_labels
         ``(n_sources,)`` part of each source, -1 where no component explains it.
     intensity
-        ``(k,)`` share of each component in the whole.
+        ``(k,)`` share of each component in the sum of all codes.
     """
 
     sources: Sources
     rho: float
-    over: str
+    over: Over
     components: NDArray[np.float64]
     basis: NDArray[np.float64]
     node_labels: NDArray[np.int32]
@@ -55,3 +63,134 @@ class Parts:
     def n_parts(self) -> int:
         """Number of parts, k."""
         return int(self.components.shape[0])
+
+    @property
+    def sizes(self) -> NDArray[np.float64]:
+        """``(k,)`` share of each part in the nodes; together at most 1."""
+        labelled = self.node_labels[self.node_labels >= 0]
+        return np.bincount(labelled, minlength=self.n_parts) / self.node_labels.size
+
+    @property
+    def unexplained(self) -> float:
+        """Share of the nodes that no component explains."""
+        return float(np.mean(self.node_labels < 0))
+
+    def relabelled(self, order: Sequence[int] | NDArray[np.integer]) -> Parts:
+        """Return the same parts with other numbers.
+
+        Parameters
+        ----------
+        order
+            For each new number the old one, or -1 for a part that this shape does not have. What belongs to
+            parts that are not named is labelled -1.
+
+        Raises
+        ------
+        ParameterError
+            When a number is not that of a part, or stands twice.
+        """
+        old = np.asarray(order, np.int64).reshape(-1)
+        named = old[old >= 0]
+        if old.size == 0 or old.min() < -1 or old.max() >= self.n_parts or np.unique(named).size < named.size:
+            given, most = ", ".join(map(str, old[:20])), self.n_parts - 1
+            msg = f"{self.shape.name}: order {given}: expected different parts from 0 to {most}, or -1"
+            raise ParameterError(msg)
+        number = np.full(self.n_parts + 1, -1, np.int32)  # the last entry serves label -1
+        number[named] = np.flatnonzero(old >= 0)
+        kept = old[:, None] >= 0
+        return replace(
+            self,
+            components=np.where(kept, self.components[old], 0.0),
+            basis=np.where(kept, self.basis[old], 0.0),
+            node_labels=number[self.node_labels],
+            source_labels=number[self.source_labels],
+            intensity=np.where(kept[:, 0], self.intensity[old], 0.0),
+        )
+
+    def without_weak(self, threshold: float = 0.25) -> Parts:
+        """Drop weak parts (Fig. 12); what they held goes to the strongest part left, or to none.
+
+        Parameters
+        ----------
+        threshold
+            Least intensity of a part that is kept, in units of the mean intensity 1/k.
+
+        Raises
+        ------
+        ParameterError
+            When no part is that strong.
+        """
+        weak = self.intensity * self.n_parts < threshold
+        if not weak.any():
+            return self
+        if weak.all():
+            strongest = self.intensity.max() * self.n_parts
+            msg = f"threshold={threshold:g}: every part is weaker; expected at most {strongest:.3g}"
+            raise ParameterError(msg)
+        samples, features = contributions(self.components, self.basis)
+        samples[weak] = features[weak] = 0.0
+        return self._filled(strongest_part(samples), strongest_part(features), weak)
+
+    def _filled(
+        self, samples: NDArray[np.int32], features: NDArray[np.int32], gone: NDArray[np.bool_]
+    ) -> Parts:
+        """Give what the parts that are gone held to other ones, and leave them out."""
+        nodes, sources = (samples, features) if self.over == "region" else (features, samples)
+        gone_or_none = np.append(gone, False)  # the last entry serves label -1
+        filled = replace(
+            self,
+            node_labels=np.where(gone_or_none[self.node_labels], nodes, self.node_labels),
+            source_labels=np.where(gone_or_none[self.source_labels], sources, self.source_labels),
+        )
+        return filled.relabelled(np.flatnonzero(~gone))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Label the arrays: dims ``part``, ``node`` and ``source``, coordinates of nodes and sources."""
+        import xarray
+
+        sample, feature = ("node", "source") if self.over == "region" else ("source", "node")
+        coords = {f"x{a}": ("node", column) for a, column in enumerate(self.shape.points.T)}
+        coords |= {f"source_x{a}": ("source", column) for a, column in enumerate(self.sources.position.T)}
+        arrays = {
+            "components": (("part", sample), self.components),
+            "basis": (("part", feature), self.basis),
+            "node_labels": ("node", self.node_labels),
+            "source_labels": ("source", self.source_labels),
+            "intensity": ("part", self.intensity),
+            "size": ("part", self.sizes),
+        }
+        attributes = {"name": self.shape.name, "rho": self.rho, "over": self.over}
+        return xarray.Dataset(arrays, coords | {"part": np.arange(self.n_parts)}, attributes)
+
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{100 * size:.0f}" for size in self.sizes)
+        lost = f", {100 * self.unexplained:.0f} % of the nodes in none" if self.unexplained else ""
+        what = f"{self.n_parts} parts of its {self.over}, rho {self.rho:g}"
+        return f"Parts({self.shape.name!r}, {what}, sizes {sizes} %{lost})"
+
+
+def contributions(
+    components: NDArray[np.float64], basis: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how much each component brings to each sample and to each feature.
+
+    Parameters
+    ----------
+    components
+        ``(k, n_samples)`` rows of S.
+    basis
+        ``(k, n_features)`` columns of A.
+
+    Returns
+    -------
+    tuple
+        ``(k, n_samples)`` and ``(k, n_features)``: norms of the columns and of the rows of each Aⱼ Sⱼ.
+    """
+    norms = np.linalg.norm(basis, axis=1, keepdims=True), np.linalg.norm(components, axis=1, keepdims=True)
+    return components * norms[0], basis * norms[1]
+
+
+def strongest_part(contribution: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Return the component of most contribution to each column of ``(k, n)``, -1 where none has any."""
+    strongest = contribution.argmax(axis=0)
+    return np.where(contribution.max(axis=0) > 0, strongest, -1).astype(np.int32)
