@@ -8,9 +8,15 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
+from spem.errors import ParameterError
 from spem.fields.boundary_points import BoundaryPoints, boundary_points
 from spem.fields.operator import System
+
+# A click on a picture may miss the boundary by this many voxels; farther off, the wrong place was meant.
+_TOLERANCE = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +40,14 @@ class Sources:
     points: BoundaryPoints
     group: NDArray[np.int32]
 
-    @property
+    @cached_property
     def n_sources(self) -> int:
         """Number of sources."""
         return int(self.group.max()) + 1
 
     @cached_property
     def position(self) -> NDArray[np.float64]:
-        """``(n_sources, d)`` mean position of the points of each source."""
+        """``(n_sources, d)`` mean position of the points of each source, in the shape's own coordinates."""
         inside = self.group >= 0
         group, points = self.group[inside], self.points.position[inside]
         count = np.bincount(group, minlength=self.n_sources)
@@ -49,8 +55,21 @@ class Sources:
         return np.stack(sums, axis=1) / count[:, None]
 
     @cached_property
+    def measure(self) -> NDArray[np.float64]:
+        """``(n_sources,)`` length, area ... of the boundary of each source, in units of spacing^(d-1)."""
+        inside = self.group >= 0
+        total = np.bincount(self.group[inside], self.points.measure[inside], self.n_sources)
+        return total.astype(np.float64)
+
+    @cached_property
+    def contour(self) -> NDArray[np.int32]:
+        """``(n_sources,)`` contour, or connected piece of boundary, of each source: of its first point."""
+        group, first = np.unique(self.group, return_index=True)
+        return self.points.contour[first[group >= 0]]
+
+    @cached_property
     def rhs(self) -> scipy.sparse.csc_array:
-        """``(n_nodes, n_sources)`` right-hand sides: 1/(θ h²) of each boundary edge, in its source's column."""
+        """``(n_nodes, n_sources)`` right-hand sides: 1/(θ h²) of each edge, in its source's column."""
         domain = self.system.domain
         node, direction = np.nonzero(domain.neighbours == domain.n_nodes)
         source = self.group[self.points.edge_point]
@@ -59,15 +78,185 @@ class Sources:
         shape = (domain.n_nodes, self.n_sources)
         return scipy.sparse.coo_array((value[used], (node[used], source[used])), shape=shape).tocsc()
 
+    @cached_property
+    def reach(self) -> scipy.sparse.csr_array:
+        """``(n_sources, n_components)`` True where a source touches a connected component of nodes.
+
+        Components are those of `node_components`. An outside voxel between two components touches both; in
+        all others the field of a source is zero.
+        """
+        domain = self.system.domain
+        node, _ = np.nonzero(domain.neighbours == domain.n_nodes)
+        source, component = self.group[self.points.edge_point], node_components(self.system)
+        used = source >= 0
+        shape = (self.n_sources, int(component.max()) + 1)
+        touching = (np.ones(np.count_nonzero(used), bool), (source[used], component[node[used]]))
+        reach = scipy.sparse.coo_array(touching, shape=shape).tocsr()
+        return reach.astype(bool)
+
     def select(self, sources: ArrayLike) -> Sources:
-        """Keep the sources with these numbers, renumbered in the order given."""
-        chosen = np.asarray(sources, np.int64)
+        """Keep the sources with these numbers, renumbered in the order given.
+
+        Raises
+        ------
+        ParameterError
+            When a number is not that of a source, is no whole number or stands twice, or none is given.
+        """
+        chosen = _checked_numbers(sources, self.n_sources, self.system.shape.name)
         number = np.full(self.n_sources + 1, -1, np.int32)  # the last entry serves group -1
         number[chosen] = np.arange(chosen.size, dtype=np.int32)
         return replace(self, group=number[self.group])
 
+    def nearest(
+        self, positions: ArrayLike, *, tolerance: float | None = None, distinct: bool = True
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Find the source that holds the nearest boundary point of each given point.
+
+        Parameters
+        ----------
+        positions
+            ``(k, d)`` coordinates, in the shape's own coordinates; ``(d,)`` for one point.
+        tolerance
+            Greatest distance from the boundary, in the unit of the spacing; three voxels by default.
+        distinct
+            Whether two points that fall on one source are refused.
+
+        Returns
+        -------
+        source
+            ``(k,)`` numbers of the sources.
+        distance
+            ``(k,)`` distance of each point from its boundary point, in the unit of the spacing.
+
+        Raises
+        ------
+        ParameterError
+            When a point is too far from the boundary, two fall on one source, or they are no points of d
+            finite coordinates.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from spem.fields.operator import assemble
+        >>> from spem.shapes.shape import Shape
+        >>> sources = point_sources(assemble(Shape.from_mask(np.ones((1, 3))), "voxel"))
+        >>> source, distance = sources.nearest([(0.0, 3.5)])
+        >>> sources.position[source].tolist(), distance.tolist()
+        ([[0.0, 3.0]], [0.5])
+        """
+        shape = self.system.shape
+        asked = _checked_positions(positions, shape.ndim, shape.name)
+        limit = _TOLERANCE * max(shape.spacing) if tolerance is None else tolerance
+        used = np.flatnonzero(self.group >= 0)
+        tree = KDTree(self.points.position[used])
+        distance, hit = tree.query(asked)
+        far = np.flatnonzero(~(distance <= limit))
+        if far.size:
+            worst = int(far[0])
+            near = _text(self.points.position[used[hit[worst]]])
+            msg = (
+                f"{shape.name}: the point {_text(asked[worst])} is {distance[worst]:.4g} from the boundary, "
+                f"more than {limit:.4g}; the nearest boundary node is {near}"
+            )
+            raise ParameterError(msg)
+        source = self.group[used[hit]].astype(np.int64)
+        if distinct:
+            _refuse_twins(source, asked, shape.name)
+        return source, np.asarray(distance)
+
+    def __repr__(self) -> str:
+        points = np.count_nonzero(self.group >= 0)
+        kind = f"{self.n_sources} sources" if self.n_sources != 1 else "1 source"
+        return (
+            f"Sources({self.system.shape.name!r}, {self.system.boundary}, {kind} of {points} of "
+            f"{self.points.n_points} boundary points, {self.points.n_contours} contours)"
+        )
+
 
 def point_sources(system: System) -> Sources:
-    """Every boundary point as a source of its own."""
+    """Make every boundary point a source of its own, in the order of `boundary_points`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from spem.fields.operator import assemble
+    >>> from spem.shapes.shape import Shape
+    >>> point_sources(assemble(Shape.from_mask(np.ones((2, 3))), "voxel"))
+    Sources('shape', voxel, 10 sources of 10 of 10 boundary points, 1 contours)
+    """
     points = boundary_points(system)
     return Sources(system, points, np.arange(points.n_points, dtype=np.int32))
+
+
+def node_components(system: System) -> NDArray[np.int32]:
+    """Find the connected component of each node, over uncut edges.
+
+    Returns
+    -------
+    component
+        ``(n_nodes,)`` number of the component; by number of nodes, largest first.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from spem.fields.operator import assemble
+    >>> from spem.shapes.shape import Shape
+    >>> node_components(assemble(Shape.from_mask([1, 0, 1, 1])))
+    array([1, 0, 0], dtype=int32)
+    """
+    neighbours, n = system.domain.neighbours, system.n_nodes
+    upward = neighbours[:, 1::2]
+    node, axis = np.nonzero(upward < n)
+    ones = np.ones(node.size, np.int8)
+    graph = scipy.sparse.coo_array((ones, (node, upward[node, axis])), shape=(n, n)).tocsr()
+    count, component = connected_components(graph, directed=False)
+    rank = np.empty(count, np.int32)
+    rank[np.argsort(-np.bincount(component), kind="stable")] = np.arange(count, dtype=np.int32)
+    return np.asarray(rank[component])
+
+
+def _checked_numbers(sources: ArrayLike, n: int, name: str) -> NDArray[np.int64]:
+    """Return source numbers, each between 0 and n - 1 and given once."""
+    numbers = np.atleast_1d(np.asarray(sources))
+    if numbers.ndim != 1 or not numbers.size or numbers.dtype.kind not in "iu":
+        msg = f"{name}: sources are chosen by whole numbers from 0 to {n - 1}, got {sources!r}"
+        raise ParameterError(msg)
+    stray = numbers[(numbers < 0) | (numbers >= n)]
+    if stray.size:
+        msg = f"{name}: there is no source {stray[0]}, expected 0 to {n - 1}"
+        raise ParameterError(msg)
+    value, count = np.unique(numbers, return_counts=True)
+    if value.size < numbers.size:
+        msg = f"{name}: source {value[np.argmax(count > 1)]} is chosen twice; give each source once"
+        raise ParameterError(msg)
+    return numbers.astype(np.int64)
+
+
+def _checked_positions(positions: ArrayLike, d: int, name: str) -> NDArray[np.float64]:
+    """Return finite points, one a row."""
+    try:
+        asked = np.atleast_2d(np.asarray(positions, np.float64))
+    except (TypeError, ValueError):
+        asked = np.empty((0, 0))
+    if asked.ndim != 2 or asked.shape[1] != d or not len(asked) or not np.isfinite(asked).all():
+        msg = f"{name}: a point has {d} finite coordinates, got {positions!r}"
+        raise ParameterError(msg)
+    return asked
+
+
+def _refuse_twins(source: NDArray[np.int64], asked: NDArray[np.float64], name: str) -> None:
+    """Refuse two points on one source."""
+    order = np.argsort(source, kind="stable")
+    twins = np.flatnonzero(np.diff(source[order]) == 0)
+    if twins.size:
+        first, second = order[twins[0]], order[twins[0] + 1]
+        msg = (
+            f"{name}: the points {_text(asked[first])} and {_text(asked[second])} fall on one source, "
+            f"{source[first]}; give each source once"
+        )
+        raise ParameterError(msg)
+
+
+def _text(point: NDArray[np.float64]) -> str:
+    """Coordinates as they are given on the command line."""
+    return ",".join(f"{x:.6g}" for x in point)
