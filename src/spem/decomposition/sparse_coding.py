@@ -12,8 +12,8 @@ from sklearn.base import BaseEstimator, ClassNamePrefixFeaturesOutMixin, Transfo
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from spem.decomposition.coding_descent import Coding, descend, encode
-from spem.decomposition.coding_starts import STARTS, Start, row_squares, start_atoms
+from spem.decomposition.coding_descent import encode
+from spem.decomposition.coding_search import RULES, Rule, Search, row_squares
 from spem.errors import ParameterError
 
 
@@ -43,12 +43,13 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     sparsity
         λ, in the unit of the samples' norms; `largest_sparsity` is the limit at which all codes vanish.
     init
-        How starts are chosen, ``"farthest"``, ``"k-means++"`` or ``"random"``, or ``(≤ k, n_features)``
-        atoms to start from; missing ones are added by ``"k-means++"``.
+        How starts are chosen, ``"farthest"``, ``"k-means++"`` or ``"random"`` (see `Search`), or
+        ``(≤ k, n_features)`` atoms to start from, such as those of a smaller k; missing ones are added by
+        ``"k-means++"``.
     n_init
-        Number of starts; the one of least objective is kept.
+        Number of starts, compared on a sample of the data; one if `init` has all atoms.
     max_iter
-        Most outer iterations of one start.
+        Most outer iterations, on a sample or on all data.
     tol
         Share of the objective by which five outer iterations must lower it to go on.
     random_state
@@ -57,17 +58,19 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     Attributes
     ----------
     components_
-        ``(k, n_features)`` atoms D, of unit norm; zero only if nothing is left to explain.
+        ``(k, n_features)`` atoms D, of unit norm.
     objective_
         Objective of the codes that `fit_transform` returns.
     objective_path_
-        ``(n_iter_,)`` objective after each outer iteration of the best start; never rises.
+        ``(n_iter_,)`` objective after each outer iteration on all data; never rises.
     reconstruction_err_
         ‖X − CD‖.
     n_iter_
-        Number of outer iterations of the best start.
+        Number of outer iterations on all data.
     converged_
-        Whether the best start met `tol` within `max_iter`.
+        Whether they met `tol` within `max_iter`.
+    n_active_
+        Number of atoms that any sample uses; fewer than k where λ leaves nothing for another one.
     n_features_in_
         Number of features seen by `fit`.
 
@@ -86,7 +89,7 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         n_components: int = 8,
         sparsity: float = 0.0,
         *,
-        init: Start | ArrayLike = "k-means++",
+        init: Rule | ArrayLike = "farthest",
         n_init: int = 4,
         max_iter: int = 500,
         tol: float = 1e-5,
@@ -109,9 +112,12 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         """Find atoms and return the codes ``(n_samples, k)`` of the samples; `y` is ignored."""
         samples = self._samples(X, reset=True)
         self._check_parameters(samples)
+        known, rule = self._known(samples.shape[1])
+        search = Search(rule, self.n_init, self.max_iter, self.tol)
         random = check_random_state(self.random_state)
-        coding = min((self._run(samples, random) for _ in range(self.n_init)), key=lambda c: c.path[-1])
+        coding = search.run(samples, self.n_components, known, self.sparsity, random)
         self.components_ = coding.atoms
+        self.n_active_ = int(coding.codes.any(axis=0).sum())
         self.objective_path_ = coding.path
         self.objective_ = float(coding.path[-1])
         self.n_iter_ = len(coding.path)
@@ -135,16 +141,22 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
             raise ParameterError(msg)
         return np.asarray(C @ self.components_)
 
-    def _run(self, samples: Any, random: RandomState) -> Coding:
-        """Descend from one start."""
-        rule: Start = "k-means++"
-        known = np.empty((0, samples.shape[1]))
+    def _known(self, n_features: int) -> tuple[NDArray[np.float64], Rule]:
+        """Return the atoms to start from and the rule by which the others are chosen."""
         if isinstance(self.init, str):
-            rule = self.init  # type: ignore[assignment]
-        else:
-            known = np.asarray(self.init, np.float64)
-        atoms = start_atoms(samples, known, self.n_components, rule, random)
-        return descend(samples, atoms, self.sparsity, self.max_iter, self.tol)
+            if self.init not in RULES:
+                msg = f"init={self.init!r}: expected one of {', '.join(map(repr, RULES))}, or atoms"
+                raise ParameterError(msg)
+            return np.empty((0, n_features)), self.init
+        atoms = np.asarray(self.init, np.float64)
+        fits = atoms.ndim == 2 and len(atoms) <= self.n_components and atoms.shape[1] == n_features
+        if not fits or not np.isfinite(atoms).all() or (atoms < 0).any():
+            msg = (
+                f"init has the shape {atoms.shape}; expected finite atoms from 0 on, "
+                f"of shape (≤ {self.n_components}, {n_features})"
+            )
+            raise ParameterError(msg)
+        return atoms / np.maximum(np.linalg.norm(atoms, axis=1, keepdims=True), 1), "k-means++"
 
     def _samples(self, X: ArrayLike, *, reset: bool) -> Any:
         """Check samples; return a float64 array or CSR matrix."""
@@ -181,9 +193,14 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
                 f"expected less than {largest:.6g}, the largest norm of a sample"
             )
             raise ParameterError(msg)
-        if isinstance(self.init, str) and self.init not in STARTS:
-            msg = f"init={self.init!r}: expected one of {', '.join(map(repr, STARTS))}, or atoms"
-            raise ParameterError(msg)
+        for name, value, least in (
+            ("n_init", self.n_init, 1),
+            ("max_iter", self.max_iter, 1),
+            ("tol", self.tol, 0),
+        ):
+            if not value >= least:
+                msg = f"{name}={value}: expected at least {least}"
+                raise ParameterError(msg)
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
