@@ -17,7 +17,7 @@ from spem.shapes.limits import format_size, memory_limit_bytes
 #: Called with a stage's name, how much of it is done, and of how much.
 Progress = Callable[[str, int, int], None]
 
-# Fields solved at a time: enough for the solver's matrix products, few enough for its caches.
+# Fields solved at a time at most: enough for the solver's matrix products, few enough for its caches.
 _BLOCK = 64
 # Right-hand sides, solutions, their transpose and the solver's own working copy.
 _COPIES = 4
@@ -190,4 +190,4 @@ def block_size(sources: Sources, held: int, memory_limit: int | None) -> int:
             "memory_limit= or SPEM_MEMORY_LIMIT"
         )
         raise SizeError(msg)
-    return int(min(_BLOCK, room // _COPIES, max(held, 1)))
+    return int(min(_BLOCK, room // _COPIES))

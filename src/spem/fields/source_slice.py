@@ -41,7 +41,7 @@ class SourceSlice:
 
     @cached_property
     def reach(self) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-        """``(n_nodes,)`` component of each node; ``(n_sources, n_components)`` which ones a source touches."""
+        """``(n_nodes,)`` component of each node; ``(n_sources, n_components)`` those a source touches."""
         sources, rhs = self.sources, self.sources.rhs
         count, component = scipy.sparse.csgraph.connected_components(sources.system.matrix(), directed=False)
         touched = np.zeros((sources.n_sources, count), bool)

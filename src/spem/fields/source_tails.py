@@ -25,7 +25,7 @@ _LN2 = float(np.log(2.0))
 
 
 def scaled(rhs: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
-    """Scale right-hand sides ``(n_nodes, k)`` ≥ 0 by 2^exponent, so that small solutions are normal numbers."""
+    """Scale right-hand sides ``(n_nodes, k)`` ≥ 0 by 2^exponent: then small solutions are normal numbers."""
     largest = float(rhs.sum(axis=0).max(initial=0.0))
     exponent = _TOP - max(int(np.frexp(largest)[1]), 0)
     return np.ldexp(rhs, exponent), exponent

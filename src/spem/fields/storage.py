@@ -50,46 +50,22 @@ def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
     target = Path(path)
     if target.exists():
         load_hyperfield(target)
-    draft, old = (target.with_name(target.name + suffix) for suffix in (".part", ".old"))
-    for folder in (draft, old):
-        shutil.rmtree(folder, ignore_errors=True)
+    draft = target.with_name(target.name + ".part")
+    shutil.rmtree(draft, ignore_errors=True)
     group = zarr.open_group(draft, mode="w")
-    shape, cuts = field.shape, field.shape.cuts
-    arrays: dict[str, NDArray[Any]] = {
+    shape_arrays, shape_attributes = pack_shape(field.shape)
+    arrays: dict[str, NDArray[Any]] = shape_arrays | {
         "basis": field.basis,
         "gram": field.gram,
         "mass": field.mass,
         "stiffness": field.stiffness,
         "source": field.source,
         "rho": field.rho,
-        "voxels": shape.voxels,
-        "cut_voxel": cuts.voxel,
-        "cut_direction": cuts.direction,
-        "cut_fraction": cuts.fraction,
     }
-    if shape.affine is not None:
-        arrays["affine"] = shape.affine
-    for name, values in arrays.items():
-        chunks = (min(_CHUNK, max(values.shape[0], 1)), *values.shape[1:])
-        group.create_array(name, shape=values.shape, dtype=values.dtype, chunks=chunks)
-        group[name][...] = values  # type: ignore[index]
-    group.attrs.update(
-        {
-            "spem_hyperfield": FORMAT,
-            "name": shape.name,
-            "grid": list(shape.mask.shape),
-            "spacing": list(shape.spacing),
-            "origin": list(shape.origin),
-            "boundary": field.boundary,
-            "error": field.error,
-            "report": asdict(shape.report),
-            "sha256": _digest(arrays),
-        }
-    )
-    if target.exists():
-        target.rename(old)
-    draft.rename(target)
-    shutil.rmtree(old, ignore_errors=True)
+    write_arrays(group, arrays)
+    own = {"spem_hyperfield": FORMAT, "boundary": field.boundary, "error": field.error}
+    group.attrs.update(shape_attributes | own | {"sha256": digest(arrays)})
+    put_in_place(draft, target)
 
 
 def load_hyperfield(path: str | Path) -> Hyperfield:
@@ -114,7 +90,7 @@ def load_hyperfield(path: str | Path) -> Hyperfield:
         raise ReadError(msg)
     try:
         arrays = {name: np.asarray(array[...]) for name, array in group.arrays()}
-        if _digest(arrays) == attributes["sha256"]:
+        if digest(arrays) == attributes["sha256"]:
             return _assemble(attributes, arrays)
         reason = "its numbers are not those that were written"
     except (KeyError, TypeError, ValueError, IndexError, RuntimeError, OSError) as error:
@@ -123,7 +99,62 @@ def load_hyperfield(path: str | Path) -> Hyperfield:
     raise ReadError(msg)
 
 
-def _digest(arrays: dict[str, NDArray[Any]]) -> str:
+def pack_shape(shape: Shape) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Return a shape as named arrays and as attributes, for `unpack_shape`."""
+    cuts = shape.cuts
+    arrays: dict[str, NDArray[Any]] = {
+        "voxels": shape.voxels,
+        "cut_voxel": cuts.voxel,
+        "cut_direction": cuts.direction,
+        "cut_fraction": cuts.fraction,
+    }
+    if shape.affine is not None:
+        arrays["affine"] = shape.affine
+    attributes: dict[str, Any] = {
+        "name": shape.name,
+        "grid": list(shape.mask.shape),
+        "spacing": list(shape.spacing),
+        "origin": list(shape.origin),
+        "report": asdict(shape.report),
+    }
+    return arrays, attributes
+
+
+def unpack_shape(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> Shape:
+    """Put a shape together from what `pack_shape` made of it."""
+    mask = np.zeros(attributes["grid"], bool)
+    mask.reshape(-1)[arrays["voxels"]] = True
+    report = attributes["report"]
+    return Shape(
+        mask,
+        tuple(attributes["spacing"]),
+        tuple(attributes["origin"]),
+        attributes["name"],
+        Cuts(arrays["cut_voxel"], arrays["cut_direction"], arrays["cut_fraction"]),
+        Report(**{**report, "repairs": tuple(report["repairs"])}),
+        arrays.get("affine"),
+    )
+
+
+def write_arrays(group: zarr.Group, arrays: dict[str, NDArray[Any]]) -> None:
+    """Write whole arrays under their names."""
+    for name, values in arrays.items():
+        chunks = (min(_CHUNK, max(values.shape[0], 1)), *values.shape[1:])
+        group.create_array(name, shape=values.shape, dtype=values.dtype, chunks=chunks)
+        group[name][...] = values  # type: ignore[index]
+
+
+def put_in_place(draft: Path, target: Path) -> None:
+    """Move a whole draft to its place, over what is there."""
+    old = target.with_name(target.name + ".old")
+    shutil.rmtree(old, ignore_errors=True)
+    if target.exists():
+        target.rename(old)
+    draft.rename(target)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def digest(arrays: dict[str, NDArray[Any]]) -> str:
     """SHA-256 of names, types, shapes and bytes."""
     total = hashlib.sha256()
     for name in sorted(arrays):
@@ -135,20 +166,8 @@ def _digest(arrays: dict[str, NDArray[Any]]) -> str:
 
 def _assemble(attributes: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Hyperfield:
     """Put shape and hyperfield together from what was stored."""
-    mask = np.zeros(attributes["grid"], bool)
-    mask.reshape(-1)[arrays["voxels"]] = True
-    report = attributes["report"]
-    shape = Shape(
-        mask,
-        tuple(attributes["spacing"]),
-        tuple(attributes["origin"]),
-        attributes["name"],
-        Cuts(arrays["cut_voxel"], arrays["cut_direction"], arrays["cut_fraction"]),
-        Report(**{**report, "repairs": tuple(report["repairs"])}),
-        arrays.get("affine"),
-    )
     return Hyperfield(
-        shape,
+        unpack_shape(arrays, attributes),
         arrays["rho"],
         arrays["basis"],
         arrays["gram"],
