@@ -213,6 +213,6 @@ def _explained(
 
 
 def _by_size(parts: Parts) -> NDArray[np.int64]:
-    """Order of the parts: most nodes first, then most intensity, then the first node."""
+    """Order of the parts: most nodes first; of equal ones, that with the first node."""
     first = [np.argmax(parts.node_labels == j) for j in range(parts.n_parts)]
-    return np.lexsort((first, -parts.intensity, -parts.sizes))
+    return np.lexsort((first, -parts.sizes))

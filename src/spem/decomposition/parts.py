@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -161,6 +162,19 @@ class Parts:
         }
         attributes = {"name": self.shape.name, "rho": self.rho, "over": self.over}
         return xarray.Dataset(arrays, coords | {"part": np.arange(self.n_parts)}, attributes)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the parts to an npz file (see `spem.decomposition.parts_files`)."""
+        from spem.decomposition.parts_files import save_parts
+
+        save_parts(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Parts:
+        """Read parts that `save` wrote."""
+        from spem.decomposition.parts_files import load_parts
+
+        return load_parts(path)
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{100 * size:.0f}" for size in self.sizes)

@@ -1,0 +1,188 @@
+"""Parts on disk: one npz that plain NumPy reads, with the shape and the sources they belong to."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.decomposition.parts import Parts
+from spem.errors import ParameterError, ReadError, SpemError
+from spem.fields.boundary_points import boundary_points
+from spem.fields.operator import assemble
+from spem.fields.sources import Sources
+from spem.shapes.shape import Cuts, Report, Shape
+
+FORMAT = 1
+# What zipfile, numpy and json raise on bytes that are not what they expect.
+_DAMAGE = (
+    OSError,
+    ValueError,
+    LookupError,
+    TypeError,
+    EOFError,
+    MemoryError,
+    RuntimeError,
+    zipfile.BadZipFile,
+)
+
+
+def save_parts(parts: Parts, path: str | os.PathLike[str]) -> None:
+    """Write parts to an npz file, all of it or nothing; a file that is there is replaced.
+
+    Arrays for any reader: ``points`` ``(n_nodes, d)``, ``labels`` of the nodes, ``components``, ``basis``,
+    ``sources`` (their positions), ``source_labels``, ``intensity``, ``rho``, ``spacing``. The others rebuild
+    the shape and its sources.
+
+    Parameters
+    ----------
+    parts
+        The parts.
+    path
+        The file, by custom ``*.npz``.
+
+    Raises
+    ------
+    ParameterError
+        When the file cannot be written.
+
+    Examples
+    --------
+    >>> import spem, tempfile
+    >>> from spem.decomposition.division import region_parts
+    >>> from spem.fields.source_fields import solve_sources
+    >>> from spem.fields.sources import point_sources
+    >>> system = assemble(spem.Shape.from_mask(np.ones((2, 10)), name="bar"))
+    >>> parts = region_parts(solve_sources(point_sources(system), np.inf), 2)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_parts(parts, f"{folder}/bar.npz")
+    ...     load_parts(f"{folder}/bar.npz")
+    Parts('bar', 2 parts of its region, rho inf, sizes 50, 50 %)
+    """
+    target = Path(path)
+    draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+    try:
+        with draft.open("xb") as file:
+            np.savez(file, allow_pickle=False, **_arrays(parts))
+        draft.replace(target)
+    except OSError as error:
+        msg = f"{target}: cannot be written ({error.strerror}); give a file in a writable folder with room"
+        raise ParameterError(msg) from error
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def load_parts(path: str | os.PathLike[str]) -> Parts:
+    """Read parts that `save_parts` wrote.
+
+    Raises
+    ------
+    ReadError
+        When there is no such file, or it does not hold whole parts of this format.
+    """
+    source = Path(path)
+    if not source.is_file():
+        msg = f"{source}: no such file; expected parts that spem wrote"
+        raise ReadError(msg)
+    try:
+        with np.load(source, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        about = json.loads(str(arrays["about"]))
+        version = about["format"]
+        if version == FORMAT:
+            return _assemble(about, arrays)
+        reason = f"format {version}, expected {FORMAT}"
+    except (*_DAMAGE, SpemError) as error:
+        msg = f"{source}: no whole parts of a shape ({error}); divide the shape again"
+        raise ReadError(msg) from error
+    msg = f"{source}: parts of {reason}; divide the shape again with this spem"
+    raise ReadError(msg)
+
+
+def _arrays(parts: Parts) -> dict[str, NDArray[Any]]:
+    """Everything as plain arrays, and a line of JSON."""
+    shape, sources = parts.shape, parts.sources
+    about = {
+        "format": FORMAT,
+        "name": shape.name,
+        "grid": shape.mask.shape,
+        "origin": shape.origin,
+        "boundary": sources.system.boundary,
+        "over": parts.over,
+        "report": asdict(shape.report),
+    }
+    arrays: dict[str, NDArray[Any]] = {
+        "points": shape.points,
+        "labels": parts.node_labels,
+        "components": parts.components,
+        "basis": parts.basis,
+        "sources": sources.position,
+        "source_labels": parts.source_labels,
+        "intensity": parts.intensity,
+        "rho": np.array(parts.rho),
+        "spacing": np.array(shape.spacing),
+        "voxels": shape.voxels,
+        "cut_voxel": shape.cuts.voxel,
+        "cut_direction": shape.cuts.direction,
+        "cut_fraction": shape.cuts.fraction,
+        # by edge, for that order is the grid's
+        "edge_source": sources.group[sources.points.edge_point],
+        "about": np.array(json.dumps(about)),
+    }
+    return arrays if shape.affine is None else arrays | {"affine": shape.affine}
+
+
+def _assemble(about: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Parts:
+    """Put shape, sources and parts together from what was stored."""
+    mask = np.zeros(about["grid"], bool)
+    mask.reshape(-1)[arrays["voxels"]] = True
+    shape = Shape(
+        mask,
+        tuple(map(float, arrays["spacing"])),
+        tuple(about["origin"]),
+        about["name"],
+        Cuts(arrays["cut_voxel"], arrays["cut_direction"], arrays["cut_fraction"]),
+        Report(**{**about["report"], "repairs": tuple(about["report"]["repairs"])}),
+        arrays.get("affine"),
+    )
+    system = assemble(shape, about["boundary"])
+    points = boundary_points(system)
+    group = np.full(points.n_points, -1, np.int32)
+    group[points.edge_point] = arrays["edge_source"]
+    parts = Parts(
+        Sources(system, points, group),
+        float(arrays["rho"]),
+        about["over"],
+        arrays["components"],
+        arrays["basis"],
+        arrays["labels"],
+        arrays["source_labels"],
+        arrays["intensity"],
+    )
+    _check(parts)
+    return parts
+
+
+def _check(parts: Parts) -> None:
+    """Refuse arrays that do not belong together."""
+    k, n, m = parts.n_parts, parts.shape.n_nodes, parts.sources.n_sources
+    samples, features = (n, m) if parts.over == "region" else (m, n)
+    expected = {
+        "components": (k, samples),
+        "basis": (k, features),
+        "node_labels": (n,),
+        "source_labels": (m,),
+        "intensity": (k,),
+    }
+    for name, size in expected.items():
+        values = getattr(parts, name)
+        if values.shape != size or (name.endswith("labels") and not -1 <= values.min() <= values.max() < k):
+            msg = f"{name} do not fit {k} parts, {n} nodes and {m} sources"
+            raise ReadError(msg)
