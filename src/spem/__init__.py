@@ -6,13 +6,16 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from spem.api import field, maps, sweep
+    from spem.api.fields import field, maps, sweep
+    from spem.api.parts import parts, source_fields, sources
     from spem.codes.codes import Codes, Failure
     from spem.codes.model import Model
     from spem.codes.settings import Settings
     from spem.codes.vlad import VLAD
     from spem.codes.vocabulary import Vocabulary
     from spem.collections import encode, evaluate, search
+    from spem.decomposition.parts import Parts
+    from spem.decomposition.sparse_coding import NonnegativeSparseCoding
     from spem.embedding.maps import Maps
     from spem.errors import (
         ConvergenceError,
@@ -30,6 +33,8 @@ if TYPE_CHECKING:
     from spem.fields.solvers.explicit import ExplicitIteration
     from spem.fields.solvers.protocol import Solution
     from spem.fields.solvers.sweep import Sweep
+    from spem.fields.source_fields import SourceFields
+    from spem.fields.sources import Sources
     from spem.retrieval.distances import correlation_distance, fuse
     from spem.retrieval.evaluation import PrecisionRecall, Scores, bulls_eye, precision_recall
     from spem.retrieval.ranking import Answer
@@ -54,7 +59,9 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "Maps",
     "Model",
     "ModelError",
+    "NonnegativeSparseCoding",
     "ParameterError",
+    "Parts",
     "PrecisionRecall",
     "ReadError",
     "Report",
@@ -64,6 +71,8 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "ShapeError",
     "SizeError",
     "Solution",
+    "SourceFields",
+    "Sources",
     "SpemError",
     "Sweep",
     "VLAD",
@@ -76,11 +85,14 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "field",
     "fuse",
     "maps",
+    "parts",
     "precision_recall",
     "read",
     "read_all",
     "search",
     "signed_distance_shape",
+    "source_fields",
+    "sources",
     "sweep",
     "synthetic",
 ]
@@ -100,7 +112,9 @@ _HOME = {
     "Maps": "spem.embedding.maps",
     "Model": "spem.codes.model",
     "ModelError": "spem.errors",
+    "NonnegativeSparseCoding": "spem.decomposition.sparse_coding",
     "ParameterError": "spem.errors",
+    "Parts": "spem.decomposition.parts",
     "PrecisionRecall": "spem.retrieval.evaluation",
     "ReadError": "spem.errors",
     "Report": "spem.shapes.shape",
@@ -110,6 +124,8 @@ _HOME = {
     "ShapeError": "spem.errors",
     "SizeError": "spem.errors",
     "Solution": "spem.fields.solvers.protocol",
+    "SourceFields": "spem.fields.source_fields",
+    "Sources": "spem.fields.sources",
     "SpemError": "spem.errors",
     "Sweep": "spem.fields.solvers.sweep",
     "VLAD": "spem.codes.vlad",
@@ -119,15 +135,18 @@ _HOME = {
     "creatures": "spem.shapes.creatures",
     "encode": "spem.collections",
     "evaluate": "spem.collections",
-    "field": "spem.api",
+    "field": "spem.api.fields",
     "fuse": "spem.retrieval.distances",
-    "maps": "spem.api",
+    "maps": "spem.api.fields",
+    "parts": "spem.api.parts",
     "precision_recall": "spem.retrieval.evaluation",
     "read": "spem.shapes.read",
     "read_all": "spem.shapes.read",
     "search": "spem.collections",
     "signed_distance_shape": "spem.shapes.levels",
-    "sweep": "spem.api",
+    "source_fields": "spem.api.parts",
+    "sources": "spem.api.parts",
+    "sweep": "spem.api.fields",
     "synthetic": "spem.shapes.synthetic",
 }
 

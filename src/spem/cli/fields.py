@@ -98,7 +98,7 @@ def field(
     found = read_shape(shape, **grid, **inside, components=components)  # type: ignore[arg-type]
     tell_repairs(found)
     _check_drawable(found, plot)
-    from spem.api import field as solve
+    from spem.api.fields import field as solve
 
     values = solve(found, values_of_rho, boundary=boundary.value)
     if output is not None:
@@ -157,7 +157,7 @@ def maps(
     found = read_shape(shape, **grid, **inside, components=components)  # type: ignore[arg-type]
     tell_repairs(found)
     _check_drawable(found, plot)
-    from spem.api import maps as project
+    from spem.api.fields import maps as project
     from spem.fields.rho import sample_rho
 
     _check_bounds(found.size, rho_min, rho_max)

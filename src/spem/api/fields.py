@@ -1,4 +1,4 @@
-"""The facade: one short call for each step, over the objects of the stages."""
+"""The facade over ρ: fields, the sweep and its maps."""
 
 from __future__ import annotations
 

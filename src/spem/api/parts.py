@@ -1,0 +1,139 @@
+"""The facade over boundary sources: sources, their fields, and parts of one shape or several."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from spem.decomposition.division import SPARSITY, boundary_parts, region_parts
+from spem.decomposition.measurements import Over
+from spem.decomposition.parts import Parts
+from spem.fields.operator import Boundary, assemble
+from spem.fields.patches import patch_sources
+from spem.fields.rho import check_rho
+from spem.fields.source_fields import SourceFields, solve_sources
+from spem.fields.sources import Sources, point_sources
+from spem.shapes.shape import Shape
+
+# Patches of a solid's boundary: a field for each of its points would not fit (5.1).
+_PATCHES = 200
+
+
+def sources(
+    shape: Shape,
+    n_patches: int | None = None,
+    *,
+    at: ArrayLike | None = None,
+    boundary: Boundary = "surface",
+    rng: np.random.Generator | None = None,
+) -> Sources:
+    """Divide the boundary of a shape into sources (2.2).
+
+    Parameters
+    ----------
+    shape
+        Any shape.
+    n_patches
+        Number of connected patches of nearly equal area; every boundary point alone by default.
+    at
+        ``(k, d)`` coordinates, in the shape's own: keep only the sources nearest to them, in that order.
+    boundary
+        ``"surface"``: boundary points are where the surface cuts an edge; ``"voxel"``: the outside voxels
+        next to the shape, as in the paper.
+    rng
+        Where the patches begin; see `spem.fields.patches.patch_sources`.
+
+    Raises
+    ------
+    ParameterError
+        When there are more patches than boundary points, or a coordinate is far from the boundary.
+
+    Examples
+    --------
+    >>> import spem
+    >>> found = spem.sources(spem.synthetic.disk(radius=10.0, spacing=1.0), at=[(0.0, 10.0)])
+    >>> found.position.round(1).tolist()
+    [[0.0, 10.0]]
+    """
+    system = assemble(shape, boundary)
+    found = point_sources(system) if n_patches is None else patch_sources(system, n_patches, rng)
+    return found if at is None else found.select(found.nearest(at)[0])
+
+
+def source_fields(sources: Sources, rho: float = np.inf) -> SourceFields:
+    """Solve for the field v^{p_i} of every source at one ρ (2.2), as logarithms right in every entry.
+
+    Parameters
+    ----------
+    sources
+        Sources of one shape.
+    rho
+        The screening length, in the unit of the spacing; `inf` for the Laplace equation.
+
+    Raises
+    ------
+    SizeError
+        When the fields or the factorisation do not fit in memory.
+
+    Examples
+    --------
+    >>> import spem
+    >>> fields = spem.source_fields(spem.sources(spem.synthetic.disk(radius=10.0, spacing=1.0)), rho=3.0)
+    >>> bool((fields.log < 0).all())
+    True
+    """
+    return solve_sources(sources, float(check_rho(rho)[0]))
+
+
+def parts(
+    shape: Shape,
+    n_parts: int = 8,
+    *,
+    over: Over = "region",
+    rho: float = np.inf,
+    sparsity: float = SPARSITY,
+    n_patches: int | None = None,
+    boundary: Boundary = "voxel",
+    rng: np.random.Generator | None = None,
+) -> Parts:
+    """Divide a shape into parts by non-negative sparse coding of its sources' fields (4.1, 4.3, 5.2).
+
+    Parameters
+    ----------
+    shape
+        Any shape.
+    n_parts
+        Number k of components.
+    over
+        What is divided: the ``"region"`` (4.1) or the ``"boundary"`` (5.2).
+    rho
+        Screening length of the slice, in the unit of the spacing.
+    sparsity
+        λ of (4.3), as a share of the λ at which all codes vanish.
+    n_patches
+        Patches of the boundary, one source each; by default every boundary point of a silhouette, and 200
+        patches of a solid.
+    boundary
+        Boundary model; by default the paper's, where a source is an outside voxel.
+    rng
+        Randomness of patches and starts.
+
+    Raises
+    ------
+    ParameterError
+        When an argument is out of its range.
+    SizeError
+        When the fields or a factorisation do not fit in memory.
+
+    Examples
+    --------
+    >>> import numpy as np, spem
+    >>> bone = np.pad(np.ones((3, 20)), ((4, 4), (0, 0)))
+    >>> bone[:, :8] = bone[:, -8:] = 1
+    >>> spem.parts(spem.Shape.from_mask(bone, name="bone"), 2)
+    Parts('bone', 2 parts of its region, rho inf, sizes 50, 50 %)
+    """
+    divide = region_parts if over == "region" else boundary_parts
+    count = _PATCHES if n_patches is None and shape.ndim > 2 else n_patches
+    fields = source_fields(sources(shape, count, boundary=boundary, rng=rng), rho)
+    return divide(fields, n_parts, sparsity=sparsity, rng=rng)
