@@ -1,4 +1,4 @@
-"""Orthographic views of three-dimensional shapes."""
+"""Orthographic views of three-dimensional shapes, and how high pictures are."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from numpy.typing import ArrayLike, NDArray
+
+    from spem.shapes.shape import Shape
 
     View: TypeAlias = tuple[float, float] | NDArray[np.float64]
 
@@ -128,6 +130,30 @@ def view_aspect(points: ArrayLike, view: View) -> float:
     """
     width, height = np.ptp(np.asarray(points, np.float64) @ view_rotation(view)[:2].T, axis=0)
     return float(height / max(width, 1e-300))
+
+
+def picture_aspect(shape: Shape, view: View | None = None) -> float:
+    """Return the height over the width of the picture of a shape, between one eighth and four.
+
+    Parameters
+    ----------
+    shape
+        A shape of two or three dimensions.
+    view
+        View of a three-dimensional one; its broad side by default.
+
+    Examples
+    --------
+    >>> from spem.shapes.shape import Shape
+    >>> picture_aspect(Shape.from_mask(np.ones((2, 6))))
+    0.5
+    """
+    if shape.ndim == 2:
+        down, right = (n * h for n, h in zip(shape.mask.shape, shape.spacing, strict=True))
+        return float(np.clip(down / right, 0.125, 4.0))
+    points = shape.points
+    seen = view_aspect(points, principal_view(points) if view is None else view)
+    return float(np.clip(seen, 0.125, 4.0))
 
 
 def principal_view(points: ArrayLike) -> NDArray[np.float64]:

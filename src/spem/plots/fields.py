@@ -16,6 +16,7 @@ from spem.plots.values import node_values, value_limits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
     from matplotlib.image import AxesImage
     from matplotlib.lines import Line2D
     from numpy.typing import ArrayLike, NDArray
@@ -30,7 +31,7 @@ def draw_values(
     values: ArrayLike,
     ax: Axes,
     *,
-    cmap: str | None = None,
+    cmap: str | Colormap | None = None,
     symmetric: bool = False,
     limits: tuple[float, float] | None = None,
     contours: bool = False,
@@ -227,7 +228,7 @@ def _draw_grid(
     level: NDArray[np.float64],
     axes: tuple[int, int],
     ax: Axes,
-    cmap: str,
+    cmap: str | Colormap,
     limits: tuple[float, float],
 ) -> AxesImage:
     """Draw a plane of the grid with its first axis down, as far as its level is positive."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spem.errors import ParameterError
-from spem.plots.camera import principal_view, view_aspect, view_rotation
+from spem.plots.camera import picture_aspect, principal_view, view_rotation
 from spem.plots.fields import draw_line, draw_outline, draw_slice, draw_values
 from spem.plots.layout import colour_bar, curve_panels, panels
 from spem.plots.raster import render_surface
@@ -248,7 +248,7 @@ def _fill_surfaces(
     rotation = principal_view(shape.points) if view is None else view_rotation(view)
     surface = shape_surface(shape, int(np.abs(rotation[2]).argmax()), toward=rotation[2])
     pixels = round(SHARPNESS * axes[0].bbox.width)
-    size = (pixels, max(1, round(pixels * _aspect(shape, rotation))))
+    size = (pixels, max(1, round(pixels * picture_aspect(shape, rotation))))
     for ax, column, ends, known in zip(axes, values.T, limits, boundary, strict=True):
         shown = surface_values(shape, surface, column, boundary=known)
         picture = render_surface(
@@ -271,18 +271,8 @@ def _panels(
     """Axes for curves or for pictures, in the way of the shape's dimension."""
     if shape.ndim == 1:
         return curve_panels(n_panels, columns=columns)
-    aspect = _aspect(shape, view)
+    aspect = picture_aspect(shape, view)
     return panels(n_panels, columns=columns, aspect=aspect, width=width, titled=titled, bar=True)
-
-
-def _aspect(shape: Shape, view: View | None) -> float:
-    """Height over width of the picture of a shape, between one eighth and four."""
-    if shape.ndim == 2:
-        down, right = (n * h for n, h in zip(shape.mask.shape, shape.spacing, strict=True))
-        return float(np.clip(down / right, 0.125, 4.0))
-    points = shape.points
-    seen = view_aspect(points, principal_view(points) if view is None else view)
-    return float(np.clip(seen, 0.125, 4.0))
 
 
 def _titles(titles: Sequence[str] | None, n_panels: int) -> list[str]:

@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from matplotlib.patches import Patch
 
 from spem.errors import ParameterError
-from spem.plots.style import MUTED, TEXT_SIZE, new_figure
+from spem.plots.style import INK, MUTED, TEXT_SIZE, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
+    from numpy.typing import ArrayLike
 
 # Width of a panel by how many stand in a row; of more, the last.
 WIDTHS = (3.6, 2.7, 2.2, 1.9)
@@ -27,6 +30,8 @@ MARGIN, GAP, TITLE = 0.06, 0.12, 0.27
 # From the last panel to the scale, its width, and its words.
 BAR = (0.12, 0.1, 0.24)
 BAR_HEIGHT = 2.0
+# From the last panel to the key of colours, and the room of each entry.
+KEY_GAP, KEY_WIDTH, KEY_HEIGHT = 0.08, 0.74, 0.175
 
 
 def panels(
@@ -37,6 +42,7 @@ def panels(
     width: float | None = None,
     titled: bool = True,
     bar: bool = False,
+    key: int = 0,
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with a grid of `n_panels` axes for pictures, at most `columns` in a row, in even rows.
 
@@ -54,6 +60,8 @@ def panels(
         Whether room is left for titles.
     bar
         Whether room is left for `colour_bar`.
+    key
+        Number of entries that room is left for, for `colour_key`.
 
     Raises
     ------
@@ -73,7 +81,8 @@ def panels(
     above = TITLE if titled else 0.0
     step = above + (GAP if down > 1 else 0.0)
     right = across * (width + GAP) - GAP + MARGIN
-    full = right + (sum(BAR) if bar else MARGIN), 2 * MARGIN + above + down * height + (down - 1) * step
+    tall = 2 * MARGIN + above + down * height + (down - 1) * step
+    full = right + (sum(BAR) if bar else MARGIN) + _key_room(key, tall)[0], tall
     figure = new_figure(*full)
     figure.set_layout_engine("none")
     grid = figure.add_gridspec(
@@ -138,6 +147,53 @@ def colour_bar(
     bar.set_ticks(list(np.linspace(*limits, len(words))), labels=list(words))
     bar.ax.tick_params(length=0, labelsize=TEXT_SIZE, labelcolor=MUTED)
     bar.outline.set_visible(False)
+
+
+def colour_key(figure: Figure, colours: ArrayLike, words: Sequence[str]) -> Legend:
+    """Draw what each colour means, in the room that `panels` left beside the panels.
+
+    Parameters
+    ----------
+    figure
+        From `panels`, with as many entries in its `key`.
+    colours
+        ``(n, 3)`` red, green and blue, 0 to 1.
+    words
+        ``(n,)`` what each means.
+
+    Examples
+    --------
+    >>> figure, axes = panels(1, key=2)
+    >>> len(colour_key(figure, [[0, 0, 0], [1, 1, 1]], ["black", "white"]).get_texts())
+    2
+    """
+    width, height = figure.get_size_inches()
+    room, columns = _key_room(len(words), float(height))
+    return figure.legend(
+        [Patch(facecolor=colour) for colour in np.asarray(colours)],
+        words,
+        loc="center left",
+        bbox_to_anchor=(1 - (room + MARGIN - KEY_GAP) / width, 0.5),
+        ncols=columns,
+        frameon=False,
+        borderpad=0,
+        borderaxespad=0,
+        handlelength=0.9,
+        handleheight=0.9,
+        handletextpad=0.5,
+        columnspacing=1.0,
+        labelspacing=0.42,
+        fontsize=TEXT_SIZE,
+        labelcolor=INK,
+    )
+
+
+def _key_room(entries: int, height: float) -> tuple[float, int]:
+    """Width and number of columns of a key beside panels of a height, in inches."""
+    if not entries:
+        return 0.0, 0
+    columns = ceil(entries / max(1, int(height / KEY_HEIGHT)))
+    return KEY_GAP + columns * KEY_WIDTH, columns
 
 
 def _grid(n_panels: int, columns: int) -> tuple[int, int]:

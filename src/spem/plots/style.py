@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 # Okabe and Ito's palette, black last and yellow left out (too faint as a line on white).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
-# Colours of parts, by label: Okabe and Ito's, then each the farthest from those before it, by the least of its
-# distances to normal, protan, deutan and tritan eyes.
+# Colours of parts, by label: Okabe and Ito's, then each the farthest from those before it, by the least of
+# its distances to normal, protan, deutan and tritan eyes.
 PART_COLOURS = (
     *("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442"),
     *("#960F3C", "#96F0A5", "#785A78", "#F0D2FF", "#1E5A4B", "#8778F0", "#784B00"),
