@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse
@@ -14,9 +16,11 @@ from scipy.spatial import KDTree
 from spem.errors import ParameterError
 from spem.fields.boundary_points import BoundaryPoints, boundary_points
 from spem.fields.operator import System
+from spem.shapes.shape import Shape
 
 # A click on a picture may miss the boundary by this many voxels; farther off, the wrong place was meant.
 _TOLERANCE = 3.0
+_HUGE = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +135,8 @@ class Sources:
         Raises
         ------
         ParameterError
-            When a point is too far from the boundary, two fall on one source, or they are no points of d
-            finite coordinates.
+            When a point is too far from the boundary, two fall on one source, they are no points of d finite
+            coordinates, or the tolerance is no positive number.
 
         Examples
         --------
@@ -146,17 +150,18 @@ class Sources:
         """
         shape = self.system.shape
         asked = _checked_positions(positions, shape.ndim, shape.name)
-        limit = _TOLERANCE * max(shape.spacing) if tolerance is None else tolerance
+        limit = _checked_tolerance(tolerance, shape)
         used = np.flatnonzero(self.group >= 0)
-        tree = KDTree(self.points.position[used])
-        distance, hit = tree.query(asked)
-        far = np.flatnonzero(~(distance <= limit))
+        known = self.points.position[used]
+        # squares of huge coordinates would overflow; from the rim of this box the same point is nearest
+        rim = _HUGE * (np.abs(known).max() + max(shape.spacing))
+        distance, hit = KDTree(known).query(np.clip(asked, -rim, rim))
+        far = np.flatnonzero(distance > limit)
         if far.size:
-            worst = int(far[0])
-            near = _text(self.points.position[used[hit[worst]]])
+            point, near = asked[far[0]], known[hit[far[0]]]
             msg = (
-                f"{shape.name}: the point {_text(asked[worst])} is {distance[worst]:.4g} from the boundary, "
-                f"more than {limit:.4g}; the nearest boundary node is {near}"
+                f"{shape.name}: the point {_text(point)} is {math.dist(point, near):.4g} from the boundary, "
+                f"more than {limit:.4g}; the nearest boundary node is {_text(near)}"
             )
             raise ParameterError(msg)
         source = self.group[used[hit]].astype(np.int64)
@@ -242,6 +247,16 @@ def _checked_positions(positions: ArrayLike, d: int, name: str) -> NDArray[np.fl
         msg = f"{name}: a point has {d} finite coordinates, got {positions!r}"
         raise ParameterError(msg)
     return asked
+
+
+def _checked_tolerance(tolerance: Any, shape: Shape) -> float:
+    """Return a positive distance; infinity is allowed."""
+    if tolerance is None:
+        return _TOLERANCE * max(shape.spacing)
+    if not isinstance(tolerance, int | float | np.number) or not tolerance > 0:
+        msg = f"{shape.name}: tolerance={tolerance!r} must be a positive distance"
+        raise ParameterError(msg)
+    return float(tolerance)
 
 
 def _refuse_twins(source: NDArray[np.int64], asked: NDArray[np.float64], name: str) -> None:
