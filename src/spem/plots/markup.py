@@ -1,10 +1,12 @@
-"""Pieces of HTML: escaped text, tables, pictures as data."""
+"""Pieces of HTML: escaped text, tables, pictures as data, whole pages."""
 
 from __future__ import annotations
 
 import re
 from base64 import b64encode
+from hashlib import sha256
 from html import escape
+from importlib.resources import files
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -117,3 +119,36 @@ def section(title: str, *content: str) -> str:
     """
     inside = "\n".join(part for part in content if part)
     return f"<section>\n<h2>{title}</h2>\n{inside}\n</section>\n" if inside else ""
+
+
+def page(title: str, summary: str, body: str, *, style: str, script: str) -> str:
+    """Return a whole page; the browser is told to run no other script and to fetch nothing.
+
+    Parameters
+    ----------
+    title
+        Heading of the page, plain text.
+    summary, body
+        What stands below the heading and in the page, HTML already.
+    style, script
+        Files of this package to put into the page.
+
+    Examples
+    --------
+    >>> page("A", "", "", style="report.css", script="report.js").count("<h1>A</h1>")
+    1
+    """
+    own = files("spem.plots")
+    rules = own.joinpath(style).read_text(encoding="utf-8")
+    code = own.joinpath(script).read_text(encoding="utf-8")
+    digest = b64encode(sha256(code.encode("utf-8")).digest()).decode("ascii")
+    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta name="color-scheme" content="light dark">\n<title>{text(title)}</title>\n'
+        f"<style>\n{rules}</style>\n</head>\n<body>\n<header>\n<h1>{text(title)}</h1>\n"
+        f"<p>{summary}</p>\n</header>\n"
+        f"<main>\n{body}</main>\n<script>{code}</script>\n</body>\n</html>\n"
+    )

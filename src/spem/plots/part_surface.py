@@ -13,9 +13,13 @@ from spem.plots.raster import vertex_normals
 from spem.plots.surfaces import shape_surface
 
 if TYPE_CHECKING:
+    from typing import TypeAlias
+
     from numpy.typing import ArrayLike, NDArray
 
     from spem.shapes.shape import Shape
+
+    Mesh: TypeAlias = tuple[ArrayLike, ArrayLike]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +64,7 @@ class PartSurface:
         return apart, distinct[:, 1].astype(np.int32)
 
 
-def part_surface(
-    shape: Shape, node_labels: ArrayLike, *, mesh: tuple[ArrayLike, ArrayLike] | None = None
-) -> PartSurface:
+def part_surface(shape: Shape, node_labels: ArrayLike, *, mesh: Mesh | None = None) -> PartSurface:
     """Divide the surface of a shape by the labels of the nodes below it.
 
     Triangles that a border crosses are cut along it.

@@ -30,9 +30,8 @@ if TYPE_CHECKING:
 
     from spem.decomposition.parts import Parts
     from spem.plots.camera import View
+    from spem.plots.part_surface import Mesh
     from spem.shapes.shape import Shape
-
-    Mesh = tuple[ArrayLike, ArrayLike]
 
 # Pictures of silhouettes have at least this many pixels along their longer side.
 FINE = 900

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
-from hashlib import sha256
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +9,7 @@ import numpy as np
 
 from spem.codes.files import write_whole
 from spem.errors import LabelError, ParameterError
-from spem.plots.markup import text
+from spem.plots.markup import page
 from spem.plots.report_gallery import Gallery, shapes_section
 from spem.plots.report_queries import queries_section
 from spem.plots.report_sections import (
@@ -107,8 +104,10 @@ def write_report(
     ]
     target = Path(path)
     # A file name that is not UTF-8 reaches here with surrogates, which no encoding takes.
-    page = _page(title, _summary(words, len(names)), "".join(body)).encode("utf-8", "replace")
-    write_whole(target, lambda file: file.write(page))
+    whole = page(
+        title, _summary(words, len(names)), "".join(body), style="report.css", script="report.js"
+    ).encode("utf-8", "replace")
+    write_whole(target, lambda file: file.write(whole))
     return target
 
 
@@ -140,21 +139,3 @@ def _summary(labels: Sequence[str] | None, n_shapes: int) -> str:
         return shapes
     n_classes = len(set(labels))
     return f"{shapes} in {n_classes} class{'' if n_classes == 1 else 'es'}"
-
-
-def _page(title: str, summary: str, body: str) -> str:
-    """Put a body into the page; the browser is told to run no script but ours and to fetch nothing."""
-    parts = files("spem.plots")
-    style = parts.joinpath("report.css").read_text(encoding="utf-8")
-    script = parts.joinpath("report.js").read_text(encoding="utf-8")
-    digest = b64encode(sha256(script.encode("utf-8")).digest()).decode("ascii")
-    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
-    return (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<meta name="color-scheme" content="light dark">\n<title>{text(title)}</title>\n'
-        f"<style>\n{style}</style>\n</head>\n<body>\n<header>\n<h1>{text(title)}</h1>\n"
-        f"<p>{summary}</p>\n</header>\n"
-        f"<main>\n{body}</main>\n<script>{script}</script>\n</body>\n</html>\n"
-    )
