@@ -16,8 +16,9 @@ from typer.core import TyperGroup
 from spem import __version__
 from spem.cli.demo import demo
 from spem.cli.encode import encode
-from spem.cli.fields import field, maps
+from spem.cli.fields import field
 from spem.cli.info import info
+from spem.cli.maps import maps
 from spem.cli.output import complain
 from spem.cli.search import evaluate, search
 from spem.errors import SizeError, SpemError
@@ -92,7 +93,7 @@ def _spem(
     Examples:
       spem demo                                   a collection, its codes, answers, scores and pictures
       spem info hand.png                          what was read, what was repaired
-      spem field hand.png --rho 4 --rho 16 -o hand.npz --plot hand.png
+      spem field hand.png --rho 4 --rho 16 -o hand.npz --plot fields.png
       spem encode shapes/ -o shapes.spem          codes of a folder
       spem search shapes.spem query.obj           the most similar shapes
 

@@ -10,7 +10,7 @@ from spem.errors import ParameterError
 from spem.plots.camera import picture_aspect
 from spem.plots.fields import draw_line, draw_outline, draw_values
 from spem.plots.layout import colour_bar, curve_panels, panels
-from spem.plots.style import FIELD_CMAP, TEXT_SIZE, bare
+from spem.plots.style import FIELD_CMAP, MUTED, TEXT_SIZE, bare
 from spem.plots.surfaces import picture_surface
 from spem.plots.values import node_columns
 
@@ -83,7 +83,7 @@ def figure_logs(
     for ax, column, title, place in zip(axes, shown.T, titles, places, strict=True):
         _draw(shape, column, ax, (low, 0.0), place)
         bare(ax, title)
-    colour_bar(figure, axes[0], FIELD_CMAP, (low, 0.0), [f"{low:.0f}" if low < -10 else f"{low:.1f}", "0"])
+    _scale(figure, axes[0], low)
     return figure
 
 
@@ -110,7 +110,16 @@ def _draw(
         size = (pixels, max(1, round(pixels * picture_aspect(shape))))
         ax.imshow(picture_surface(shape, log, limits=limits, size=size), interpolation="antialiased")
         return
-    draw_values(shape, log, ax, limits=limits)
+    draw_values(shape, log, ax, contours=True, limits=limits)
     draw_outline(shape, ax, width=0.7)
     if place is not None:
         ax.plot(place[1], place[0], "o", markersize=4, color="white", markeredgecolor="black", clip_on=False)
+
+
+def _scale(figure: Figure, ax: Axes, low: float) -> None:
+    """Draw the scale of log v; its least value stands below, where there is room for digits."""
+    colour_bar(figure, ax, FIELD_CMAP, (low, 0.0), ["", "0"])
+    bar = figure.axes[-1]
+    bar.set_title("log v", fontsize=TEXT_SIZE, color=MUTED, pad=7)
+    least = f"{-low:.0f}" if low < -10 else f"{-low:.1f}"
+    bar.set_xlabel(f"−{least}", fontsize=TEXT_SIZE, color=MUTED, labelpad=4)
