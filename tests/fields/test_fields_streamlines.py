@@ -27,7 +27,7 @@ def _vectors(shape, function):
 
 @pytest.mark.parametrize(("make", "spacing"), [(disk, (0.05, 0.03)), (ball, 0.1)])
 def test_radial_lines_are_straight_and_end_on_the_boundary(make, spacing):
-    """Lines along the radius keep their direction to within a hundredth and end on the unit sphere."""
+    """Lines along the radius keep their direction to within a hundredth and end within a voxel of the sphere."""
     shape = make(1.0, spacing, offset=0.3137)
     radius = np.linalg.norm(shape.points, axis=1)
     seeds = np.flatnonzero((radius > 0.3) & (radius < 0.4))[::7]
@@ -37,7 +37,7 @@ def test_radial_lines_are_straight_and_end_on_the_boundary(make, spacing):
         assert line[0].tolist() == shape.points[seed].tolist()
         along = line / np.linalg.norm(line, axis=1, keepdims=True)
         assert np.linalg.norm(along - along[0], axis=1).max() < 0.02
-        assert np.linalg.norm(line[-1]) == pytest.approx(1, abs=0.4 * max(shape.spacing))
+        assert np.linalg.norm(line[-1]) == pytest.approx(1, abs=max(shape.spacing))
         gaps = np.linalg.norm(np.diff(line, axis=0), axis=1)
         assert gaps[:-1] == pytest.approx(0.25 * min(shape.spacing))
         assert gaps[-1] <= 0.25 * min(shape.spacing) * (1 + 1e-9)
