@@ -191,9 +191,10 @@ def _finish(X: Any, best: _Pair, sparsity: float, path: list[float], *, converge
 def _squares(X: Any, pair: _Pair, *, positive: bool) -> NDArray[np.float64]:
     """Return the squared norms of the rows of X − CD, or of their positive parts."""
     squares = np.empty(X.shape[0])
+    atoms, codes = pair.atoms.astype(X.dtype, copy=False), pair.codes.astype(X.dtype, copy=False)
     for start in range(0, X.shape[0], _ROWS):
         block = slice(start, start + _ROWS)
-        rest = _dense(X[block]) - pair.codes[block] @ pair.atoms
+        rest = _dense(X[block]) - codes[block] @ atoms
         if positive:
             np.maximum(rest, 0, out=rest)
         squares[block] = np.einsum("ij,ij->i", rest, rest)
@@ -213,4 +214,4 @@ def _dense(X: Any) -> NDArray[Any]:
 def _square_sum(X: Any) -> float:
     """Return ‖X‖²."""
     data = X.data if scipy.sparse.issparse(X) else X
-    return float(np.vdot(data, data))
+    return float(np.square(data, dtype=np.float64).sum())

@@ -24,7 +24,8 @@ _COARSE_TOL = 1e-4
 class Search:
     """How starts are chosen and compared.
 
-    All starts descend on a small sample of the data; the best goes on through larger samples to all data.
+    Where some atoms are known, the second start ignores them. All starts descend on a small sample of the
+    data, in float32; the best goes on through larger samples to all data, in float64.
 
     Parameters
     ----------
@@ -50,26 +51,29 @@ class Search:
     ) -> Coding:
         """Return the best coding found of the samples ``X``, starting from known atoms and chosen ones."""
         order = random.permutation(X.shape[0])
-        sizes = _levels(X.shape[0], n_atoms)
-        starts = self.n_starts if len(known) < n_atoms else 1
-        coarse = X[np.sort(order[: sizes[0]])]
-        rules: list[Rule] = [self.rule] + (["k-means++"] if self.rule == "farthest" else [self.rule]) * (
-            starts - 1
-        )
-        codings = [
-            descend(
-                coarse,
-                start_atoms(coarse, n_atoms, rule, random, known),
-                sparsity,
-                self.max_iter,
-                _COARSE_TOL,
-            )
-            for rule in rules
-        ]
+        first, *between = _levels(X.shape[0], n_atoms)
+        unit = float(X.max()) or 1.0
+        coarse, weight = _sample(X, order[:first], unit), sparsity / unit
+        starts = self._starts(coarse, n_atoms, known, random)
+        codings = [descend(coarse, atoms, weight, self.max_iter, _COARSE_TOL) for atoms in starts]
         best = min(codings, key=lambda coding: float(coding.path[-1]))
-        for size in sizes[1:-1]:
-            best = descend(X[np.sort(order[:size])], best.atoms, sparsity, self.max_iter, _COARSE_TOL)
+        for size in between:
+            coarse = _sample(X, order[:size], unit)
+            best = descend(coarse, best.atoms, weight, self.max_iter, _COARSE_TOL)
         return descend(X, best.atoms, sparsity, self.max_iter, self.tol)
+
+    def _starts(
+        self, X: Any, n_atoms: int, known: NDArray[np.float64], random: RandomState
+    ) -> list[NDArray[np.float64]]:
+        """Return the atoms of each start."""
+        starts = [start_atoms(X, n_atoms, self.rule, random, known)]
+        if len(known) == n_atoms:
+            return starts
+        if len(known) and self.n_starts > 1:  # the known atoms may lie on the way to a poor minimum
+            starts.append(start_atoms(X, n_atoms, self.rule, random))
+        again: Rule = "k-means++" if self.rule == "farthest" else self.rule
+        missing = range(self.n_starts - len(starts))
+        return starts + [start_atoms(X, n_atoms, again, random, known) for _ in missing]
 
 
 def start_atoms(
@@ -92,7 +96,9 @@ def start_atoms(
     """
     squares = row_squares(X)
     atoms = [] if known is None else list(known)
-    distance = residual_squares(X, np.array(atoms), encode(X, np.array(atoms), 0.0)) if atoms else squares
+    distance = squares
+    if known is not None and len(known):
+        distance = residual_squares(X, known, encode(X, known, 0.0))
     while len(atoms) < n_atoms:
         weight = squares if rule == "random" else distance
         index = int(np.argmax(weight)) if rule == "farthest" else _draw(weight, random)
@@ -105,18 +111,22 @@ def start_atoms(
 def row_squares(X: Any) -> NDArray[np.float64]:
     """Return ``(n_samples,)`` squared norms of samples, an array or a CSR matrix."""
     if scipy.sparse.issparse(X):
-        return np.asarray(X.multiply(X).sum(axis=1)).ravel()
-    return np.asarray(np.einsum("ij,ij->i", X, X))
+        return np.asarray(X.multiply(X).sum(axis=1), np.float64).ravel()
+    return np.asarray(np.einsum("ij,ij->i", X, X), np.float64)
 
 
 def _levels(n_samples: int, n_atoms: int) -> list[int]:
-    """Return growing numbers of samples, the last one all."""
+    """Return the growing numbers of samples to descend on before all of them."""
     size = max(_FIRST, _FIRST_EACH * n_atoms)
-    sizes = []
-    while 2 * size < n_samples:
-        sizes.append(size)
-        size *= _GROWTH
-    return [*(sizes or [n_samples]), n_samples]
+    sizes = [min(size, n_samples)]
+    while 2 * _GROWTH * sizes[-1] <= n_samples:
+        sizes.append(_GROWTH * sizes[-1])
+    return sizes
+
+
+def _sample(X: Any, rows: NDArray[np.intp], unit: float) -> Any:
+    """Return these rows in multiples of the largest entry, which float32 can hold."""
+    return (X[np.sort(rows)] / unit).astype(np.float32)
 
 
 def _draw(weight: NDArray[np.float64], random: RandomState) -> int:
@@ -127,4 +137,4 @@ def _draw(weight: NDArray[np.float64], random: RandomState) -> int:
 
 def _row(X: Any, index: int) -> NDArray[np.float64]:
     """Return one sample as an array."""
-    return np.asarray(X[[index]].toarray()[0] if scipy.sparse.issparse(X) else X[index])
+    return np.asarray(X[[index]].toarray()[0] if scipy.sparse.issparse(X) else X[index], np.float64)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from numbers import Integral
 from typing import Any, Self
 
 import numpy as np
@@ -30,6 +32,51 @@ def largest_sparsity(X: Any) -> float:
     return float(np.sqrt(row_squares(X).max(initial=0.0)))
 
 
+def fit_counts(
+    X: ArrayLike,
+    counts: Iterable[int],
+    sparsity: float = 0.0,
+    *,
+    n_init: int = 4,
+    max_iter: int = 500,
+    tol: float = 1e-5,
+    random_state: int | None = None,
+) -> list[NonnegativeSparseCoding]:
+    """Fit a coder for each of several numbers of components, for the curve of `objective_` against k.
+
+    Each fit starts from the atoms of the one before, and from others, so that the curve falls.
+
+    Parameters
+    ----------
+    X
+        ``(n_samples, n_features)`` samples.
+    counts
+        Numbers of components, ascending.
+    sparsity, n_init, max_iter, tol, random_state
+        See `NonnegativeSparseCoding`.
+
+    Examples
+    --------
+    >>> X = np.array([[2.0, 0.0], [4.0, 0.0], [0.0, 3.0]])
+    >>> [round(coder.objective_, 6) for coder in fit_counts(X, [1, 2])]
+    [4.5, 0.0]
+    """
+    coders: list[NonnegativeSparseCoding] = []
+    for count in counts:
+        known = coders[-1].components_[:count] if coders else None
+        coder = NonnegativeSparseCoding(
+            count,
+            sparsity,
+            init="farthest" if known is None else known,
+            n_init=n_init,
+            max_iter=max_iter,
+            tol=tol,
+            random_state=random_state,
+        )
+        coders.append(coder.fit(X))
+    return coders
+
+
 class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  # type: ignore[misc]
     """Few non-negative atoms of the unit ball, and sparse non-negative codes on them (4.3).
 
@@ -44,8 +91,8 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         λ, in the unit of the samples' norms; `largest_sparsity` is the limit at which all codes vanish.
     init
         How starts are chosen, ``"farthest"``, ``"k-means++"`` or ``"random"`` (see `Search`), or
-        ``(≤ k, n_features)`` atoms to start from, such as those of a smaller k; missing ones are added by
-        ``"k-means++"``.
+        ``(≤ k, n_features)`` atoms to start from, such as those of a smaller k; missing ones are added as by
+        ``"farthest"``.
     n_init
         Number of starts, compared on a sample of the data; one if `init` has all atoms.
     max_iter
@@ -92,7 +139,7 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         init: Rule | ArrayLike = "farthest",
         n_init: int = 4,
         max_iter: int = 500,
-        tol: float = 1e-5,
+        tol: float = 1e-7,
         random_state: int | RandomState | None = None,
     ) -> None:
         self.n_components = n_components
@@ -156,7 +203,7 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
                 f"of shape (≤ {self.n_components}, {n_features})"
             )
             raise ParameterError(msg)
-        return atoms / np.maximum(np.linalg.norm(atoms, axis=1, keepdims=True), 1), "k-means++"
+        return atoms / np.maximum(np.linalg.norm(atoms, axis=1, keepdims=True), 1), "farthest"
 
     def _samples(self, X: ArrayLike, *, reset: bool) -> Any:
         """Check samples; return a float64 array or CSR matrix."""
@@ -177,11 +224,9 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     def _check_parameters(self, samples: Any) -> None:
         """Check the parameters against the samples."""
         n, p = samples.shape
-        if not 1 <= self.n_components <= min(n, p):
-            msg = (
-                f"n_components={self.n_components}: expected 1 to {min(n, p)}, no more than "
-                f"n_samples={n} or n_features={p}"
-            )
+        k = self.n_components
+        if not (isinstance(k, Integral) and 1 <= k <= min(n, p)):
+            msg = f"n_components={k}: expected 1 to {min(n, p)}, no more than n_samples={n} or n_features={p}"
             raise ParameterError(msg)
         if not 0 <= self.sparsity < np.inf:
             msg = f"sparsity={self.sparsity}: expected a finite number from 0 on"
