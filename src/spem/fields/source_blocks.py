@@ -6,7 +6,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,6 +110,10 @@ class SolvedBlocks:
         slices: Recent[SourceSlice] = Recent(self.factor_bytes, lambda s: factor_bytes(s.prepared, n_nodes))
         object.__setattr__(self, "_slices", slices)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle without the factors."""
+        return SolvedBlocks, (self.sources, self.rho, self.solver, self.size, self.factor_bytes)
+
     @property
     def log(self) -> bool:
         """Whether the solver is right in every entry."""
@@ -142,6 +146,10 @@ class KeptBlocks:
     def __post_init__(self) -> None:
         kept: Recent[NDArray[np.float64]] = Recent(self.field_bytes, lambda block: block.nbytes)
         object.__setattr__(self, "_kept", kept)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle without the fields."""
+        return KeptBlocks, (self.origin, self.field_bytes)
 
     @property
     def size(self) -> int:

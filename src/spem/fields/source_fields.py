@@ -99,7 +99,8 @@ def solve_sources(
     True
     """
     require_entrywise(source_solver(solver))
-    return SourceFields(sources, float(rho), _solve(sources, rho, solver, memory_limit, progress, log=True))
+    log = _solve(sources, rho, solver, memory_limit, progress, log=True)
+    return SourceFields(sources, float(rho), log)
 
 
 def source_values(

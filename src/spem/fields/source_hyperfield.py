@@ -243,7 +243,8 @@ class SourceHyperfield:
             chosen = slice(None) if wanted is None else wanted
             try:
                 key = chosen if isinstance(chosen, slice) else np.asarray(chosen)
-                result.append(np.asarray(np.arange(count)[key]))
+                empty = not isinstance(key, slice) and key.size == 0  # whose type is float
+                result.append(np.arange(0) if empty else np.asarray(np.arange(count)[key]))
             except IndexError as error:
                 msg = f"{what}={wanted!r}: expected numbers from 0 to {count - 1} ({error})"
                 raise ParameterError(msg) from error

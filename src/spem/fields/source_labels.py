@@ -34,6 +34,10 @@ class LazyFields(BackendArray):
         """Read what a key of xarray stands for."""
         return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._take)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> LazyFields:
+        """Return the same array: its numbers never change, and copying must not solve for them."""
+        return self
+
     def _take(self, key: tuple[Any, ...]) -> NDArray[np.float64]:
         """Read by position along each axis."""
         return self.hyperfield.take((key[0], key[1], key[2]), log=self.log)

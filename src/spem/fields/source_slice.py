@@ -17,6 +17,9 @@ from spem.fields.solvers.protocol import Prepared, SourceSolver
 from spem.fields.source_tails import logs, scaled, solve_tails
 from spem.fields.sources import Sources
 
+# In units of the spacing: below it a field falls by more than 1e12 from node to node.
+_LEAST_RHO = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class SourceSlice:
@@ -101,13 +104,12 @@ def prepare_slice(sources: Sources, rho: float, solver: SourceSolver | None = No
     array([[0.75, 0.5 , 0.25],
            [0.25, 0.5 , 0.75]])
     """
-    length = check_rho(rho)
-    shift = float(length[0]) ** -2.0 if length[0] > 1e-150 else np.inf  # whose square is a normal number
-    if length.size != 1 or not np.isfinite(shift):
-        msg = f"rho={rho}: expected one length, not negligible against the spacing, or inf"
+    length, least = check_rho(rho), _LEAST_RHO * min(sources.system.shape.spacing)
+    if length.size != 1 or length[0] < least:
+        msg = f"rho={rho}: expected one length of at least {least:g}, a millionth of the spacing, or inf"
         raise ParameterError(msg)
     chosen = source_solver(solver)
-    return SourceSlice(sources, float(length[0]), chosen, chosen.prepare(sources.system, shift))
+    return SourceSlice(sources, float(length[0]), chosen, chosen.prepare(sources.system, length[0] ** -2.0))
 
 
 def source_solver(solver: Any = None) -> SourceSolver:

@@ -1,8 +1,8 @@
 """Logarithms of fields that leave the range of float64: scaled right-hand sides, and tails solved apart.
 
-A field of one source falls like e^(-πd/w) along a part of width w, and faster under screening. Scaled up by
-2^1000 it is a normal number down to about 1e-570. What falls below is solved again on the nodes where it
-does: there the nodes around are the boundary, with known values, scaled up in turn.
+A field of one source falls like e^(-πd/w) along a part of width w, and faster under screening. Where it is
+below about 1e-270, numbers of the factor may have underflowed, so it is solved again on the nodes where it is
+that small: the nodes around them are the boundary there, with known values, scaled up.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from spem.fields.operator import System, assemble
 from spem.fields.solvers.protocol import SourceSolver
 from spem.shapes.shape import Cuts, Shape
 
-# Right-hand sides are scaled to this power of two: what a solve adds up stays below 2^1024.
+# Right-hand sides are scaled to this power of two: what a solve adds up stays below 2^1024, and what it
+# drops by underflow is far below the smallest value that is trusted.
 _TOP = 1000
-# Underflow errs by 2^-1074 in each operation; a solution above this loses nothing by millions of them.
+# A number of the factor that underflowed, so below 2^-1022, adds nothing to a value above this.
 _TRUSTED = -900
 # Fields share the solve of their tails when the nodes of all are at most so many times those of the smallest.
 _ALIKE = 1.25
@@ -35,11 +36,8 @@ def logs(solution: NDArray[np.float64], exponent: int) -> tuple[NDArray[np.float
     """Logarithms ``(k, n_nodes)`` of a scaled solution ``(n_nodes, k)``, and which are too small to trust."""
     rows = np.ascontiguousarray(solution.T)
     with np.errstate(divide="ignore", under="ignore"):
-        log = np.log(rows * 2.0**-exponent)
-        small = rows < 2.0 ** (exponent - _TOP)
-        if small.any():
-            log[small] = np.log(rows[small]) - exponent * _LN2
-    return log, rows < 2.0**_TRUSTED
+        log = np.log(np.ldexp(rows, -exponent))
+    return log, log < _TRUSTED * _LN2
 
 
 def solve_tails(
@@ -71,19 +69,23 @@ def solve_tails(
     while waiting:
         group = waiting.pop()
         far = np.asarray(low[group].any(axis=0))
-        if group.size > 1 and far.sum() > _ALIKE * low[group].sum(axis=1).min():
+        if group.size > 1 and not _alike(rhs[:, group], low[group], far):
             waiting += [group[: group.size // 2], group[group.size // 2 :]]
         elif group.size:
             wanted = low[group][:, far]
-            tails = _tails(system, shift, solver, rhs[:, group], log[group], far, wanted)
+            tails = _tails(system, shift, solver, log[group], far, wanted)
             log[np.ix_(group, far)] = np.where(wanted, tails, log[group][:, far])
+
+
+def _alike(rhs: scipy.sparse.csc_array, low: NDArray[np.bool_], far: NDArray[np.bool_]) -> bool:
+    """Whether fields can share a solve on the far nodes: none has its source there, and most want most."""
+    return not far[rhs.indices].any() and bool(far.sum() <= _ALIKE * low.sum(axis=1).min())
 
 
 def _tails(
     system: System,
     shift: float,
     solver: SourceSolver,
-    rhs: scipy.sparse.csc_array,
     log: NDArray[np.float64],
     far: NDArray[np.bool_],
     wanted: NDArray[np.bool_],
@@ -92,11 +94,10 @@ def _tails(
     nodes = np.flatnonzero(far)
     rows = system.matrix().tocsr()[nodes]
     near = np.setdiff1d(rows.indices, nodes)
-    with np.errstate(divide="ignore"):  # a source's own edges are there only where another's tail is
-        known, own = log[:, near], np.log(rhs.tocsr()[nodes].toarray().T)
-    top = np.maximum(known.max(axis=1), own.max(axis=1))[:, None]
+    known = log[:, near]
+    top = known.max(axis=1, keepdims=True)
     with np.errstate(under="ignore"):
-        data = (np.exp(own - top) + np.exp(known - top) @ -rows[:, near].T).T
+        data = -rows[:, near] @ np.exp(known - top).T
     part = far_system(system, far)
     dense, exponent = scaled(data)
     found, low = logs(solver.prepare(part, shift).solve(dense), exponent)
