@@ -27,7 +27,7 @@ def _vectors(shape, function):
 
 @pytest.mark.parametrize(("make", "spacing"), [(disk, (0.05, 0.03)), (ball, 0.1)])
 def test_radial_lines_are_straight_and_end_on_the_boundary(make, spacing):
-    """Lines along the radius keep their direction to within a hundredth and end within a voxel of the sphere."""
+    """Lines along the radius keep their direction to a hundredth and end within a voxel of the sphere."""
     shape = make(1.0, spacing, offset=0.3137)
     radius = np.linalg.norm(shape.points, axis=1)
     seeds = np.flatnonzero((radius > 0.3) & (radius < 0.4))[::7]
