@@ -138,7 +138,7 @@ def picture_aspect(shape: Shape, view: View | None = None) -> float:
     Parameters
     ----------
     shape
-        A shape of two or three dimensions.
+        A shape of up to three dimensions; of one, it is a band.
     view
         View of a three-dimensional one; its broad side by default.
 
@@ -148,6 +148,8 @@ def picture_aspect(shape: Shape, view: View | None = None) -> float:
     >>> picture_aspect(Shape.from_mask(np.ones((2, 6))))
     0.5
     """
+    if shape.ndim == 1:
+        return 0.125
     if shape.ndim == 2:
         down, right = (n * h for n, h in zip(shape.mask.shape, shape.spacing, strict=True))
         return float(np.clip(down / right, 0.125, 4.0))

@@ -31,7 +31,7 @@ MARGIN, GAP, TITLE = 0.06, 0.12, 0.27
 BAR = (0.12, 0.1, 0.24)
 BAR_HEIGHT = 2.0
 # From the last panel to the key of colours, and the room of each entry.
-KEY_GAP, KEY_WIDTH, KEY_HEIGHT = 0.08, 0.74, 0.175
+KEY_GAP, KEY_WIDTH, KEY_HEIGHT = 0.08, 0.78, 0.175
 
 
 def panels(

@@ -96,13 +96,20 @@ def part_surface(shape: Shape, node_labels: ArrayLike, *, mesh: Mesh | None = No
     borders = Borders.of(shape, node_labels)
     if mesh is None:
         surface = shape_surface(shape)
-        vertices, faces, samples = surface.vertices, surface.faces, surface.samples
+        vertices, faces = surface.vertices, surface.faces
+        # Half as deep as values are read: the deeper, the farther borders on slopes seem to move.
+        index = (_grid_index(shape, vertices) + surface.samples) / 2
     else:
-        merged, _, below = sample_points(shape, *mesh)
+        merged, _, samples = sample_points(shape, *mesh)
         vertices, faces = merged.vertices, merged.faces
-        samples = (below - np.asarray(shape.origin)) / np.asarray(shape.spacing)
+        index = _grid_index(shape, samples)
     normals = vertex_normals(vertices, faces)
-    return divide(vertices, faces, normals, borders.weigh(samples), borders.values)
+    return divide(vertices, faces, normals, borders.weigh(index), borders.values)
+
+
+def _grid_index(shape: Shape, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Grid indices of points, with fractions."""
+    return np.asarray((points - np.asarray(shape.origin)) / np.asarray(shape.spacing))
 
 
 def divide(

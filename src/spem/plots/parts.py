@@ -16,7 +16,7 @@ from spem.plots.fields import draw_outline
 from spem.plots.layout import colour_key, panels
 from spem.plots.level import surface_level
 from spem.plots.part_surface import part_surface
-from spem.plots.plane import clip_to, contour_lines, extent, require_dimension
+from spem.plots.plane import clip_to, contour_lines, extent
 from spem.plots.raster import render_surface
 from spem.plots.style import INK, TEXT_SIZE, TITLE_SIZE, bare, part_colours
 from spem.plots.values import require_drawable
@@ -96,7 +96,7 @@ def figure_parts(
     names = titles or ([part.shape.name for part in several] if len(several) > 1 else None)
     labels = np.unique(np.concatenate([part.node_labels for part in several]))
     labels = np.append(labels[labels >= 0], labels[labels < 0][:1])
-    aspect = max(picture_aspect(part.shape, view) for part in several if part.shape.ndim > 1)
+    aspect = max(picture_aspect(part.shape, view) for part in several)
     figure, axes = panels(
         len(several), columns=columns, aspect=aspect, width=width, titled=names is not None, key=labels.size
     )
@@ -122,7 +122,7 @@ def draw_parts(
     Parameters
     ----------
     parts
-        Parts of a shape of two or three dimensions.
+        Parts of a shape of one, two or three dimensions.
     ax
         Axis to draw on.
     boundary
@@ -138,7 +138,7 @@ def draw_parts(
     Raises
     ------
     ShapeError
-        If the shape has neither two nor three dimensions.
+        If the shape has more than three dimensions.
 
     Examples
     --------
@@ -153,7 +153,9 @@ def draw_parts(
     shape = parts.shape
     if shape.ndim == 3:
         return _draw_surface(shape, parts.node_labels, ax, view, mesh)
-    require_dimension(shape, 2, "a picture of parts")
+    require_drawable(shape)
+    if shape.ndim == 1:
+        return _draw_band(shape, parts.node_labels, ax)
     image = _draw_region(shape, parts.node_labels, ax, TONE if boundary else 0.0)
     if boundary:
         draw_boundary(parts.sources, part_colours(parts.source_labels), ax, widths=OUTLINE)
@@ -218,6 +220,16 @@ def _draw_surface(
     picture = picture_parts(shape, node_labels, view=view, mesh=mesh, size=size)
     bare(ax)
     return ax.imshow(picture, interpolation="antialiased")
+
+
+def _draw_band(shape: Shape, node_labels: NDArray[np.int32], ax: Axes) -> AxesImage:
+    """Draw a one-dimensional shape as a band, clear where it is not."""
+    picture = np.zeros((1, shape.mask.size, 4))
+    picture[0, shape.voxels] = np.column_stack([part_colours(node_labels), np.ones(shape.n_nodes)])
+    left = shape.origin[0] - shape.spacing[0] / 2
+    right = left + shape.mask.size * shape.spacing[0]
+    bare(ax)
+    return ax.imshow(picture, extent=(left, right, 0, (right - left) / 8), interpolation="nearest")
 
 
 def _draw_region(shape: Shape, node_labels: NDArray[np.int32], ax: Axes, tone: float) -> AxesImage:
