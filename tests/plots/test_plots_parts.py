@@ -133,15 +133,17 @@ def test_titles_stand_level():
     assert len(tops) == 1
 
 
+@pytest.mark.parametrize("end", ["", "  100 %"])
 @pytest.mark.parametrize("entries", [1, 7, 30])
-def test_a_key_fits_beside_its_panels(entries):
+def test_a_key_fits_beside_its_panels(entries, end):
     """However many entries, the key stays in the figure and off the panels."""
-    figure, axes = panels(2, key=entries)
-    key = colour_key(figure, part_colours(np.arange(entries)), [f"{j}  100 %" for j in range(entries)])
+    words = [f"{j}{end}" for j in range(entries)]
+    figure, axes = panels(2, key=words)
+    key = colour_key(figure, part_colours(np.arange(entries)), words)
     figure.canvas.draw()
     box = key.get_window_extent()
     assert box.x0 > axes[-1].get_window_extent().x1
-    assert box.x1 < figure.bbox.x1
+    assert box.x1 < figure.bbox.x1 < box.x1 + figure.dpi * 0.4
     assert 0 <= box.y0 < box.y1 <= figure.bbox.y1
 
 

@@ -30,8 +30,8 @@ MARGIN, GAP, TITLE = 0.06, 0.12, 0.27
 # From the last panel to the scale, its width, and its words.
 BAR = (0.12, 0.1, 0.24)
 BAR_HEIGHT = 2.0
-# From the last panel to the key of colours, and the room of each entry.
-KEY_GAP, KEY_WIDTH, KEY_HEIGHT = 0.08, 0.78, 0.175
+# From the last panel to the key of colours, and the room of each entry: its patch, a letter, its height.
+KEY_GAP, KEY_PATCH, KEY_LETTER, KEY_HEIGHT = 0.08, 0.3, 0.061, 0.175
 
 
 def panels(
@@ -42,7 +42,7 @@ def panels(
     width: float | None = None,
     titled: bool = True,
     bar: bool = False,
-    key: int = 0,
+    key: Sequence[str] = (),
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with a grid of `n_panels` axes for pictures, at most `columns` in a row, in even rows.
 
@@ -61,7 +61,7 @@ def panels(
     bar
         Whether room is left for `colour_bar`.
     key
-        Number of entries that room is left for, for `colour_key`.
+        Words that room is left for, for `colour_key`.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def colour_key(figure: Figure, colours: ArrayLike, words: Sequence[str]) -> Lege
     Parameters
     ----------
     figure
-        From `panels`, with as many entries in its `key`.
+        From `panels`, with the same words as its `key`.
     colours
         ``(n, 3)`` red, green and blue, 0 to 1.
     words
@@ -163,12 +163,13 @@ def colour_key(figure: Figure, colours: ArrayLike, words: Sequence[str]) -> Lege
 
     Examples
     --------
-    >>> figure, axes = panels(1, key=2)
-    >>> len(colour_key(figure, [[0, 0, 0], [1, 1, 1]], ["black", "white"]).get_texts())
+    >>> words = ["black", "white"]
+    >>> figure, axes = panels(1, key=words)
+    >>> len(colour_key(figure, [[0, 0, 0], [1, 1, 1]], words).get_texts())
     2
     """
     width, height = figure.get_size_inches()
-    room, columns = _key_room(len(words), float(height))
+    room, columns = _key_room(words, float(height))
     return figure.legend(
         [Patch(facecolor=colour) for colour in np.asarray(colours)],
         words,
@@ -188,12 +189,12 @@ def colour_key(figure: Figure, colours: ArrayLike, words: Sequence[str]) -> Lege
     )
 
 
-def _key_room(entries: int, height: float) -> tuple[float, int]:
+def _key_room(words: Sequence[str], height: float) -> tuple[float, int]:
     """Width and number of columns of a key beside panels of a height, in inches."""
-    if not entries:
+    if not words:
         return 0.0, 0
-    columns = ceil(entries / max(1, int(height / KEY_HEIGHT)))
-    return KEY_GAP + columns * KEY_WIDTH, columns
+    columns = ceil(len(words) / max(1, int(height / KEY_HEIGHT)))
+    return KEY_GAP + columns * (KEY_PATCH + KEY_LETTER * max(map(len, words))), columns
 
 
 def _grid(n_panels: int, columns: int) -> tuple[int, int]:

@@ -97,14 +97,15 @@ def figure_parts(
     labels = np.unique(np.concatenate([part.node_labels for part in several]))
     labels = np.append(labels[labels >= 0], labels[labels < 0][:1])
     aspect = max(picture_aspect(part.shape, view) for part in several)
+    words = _words(labels, several)
     figure, axes = panels(
-        len(several), columns=columns, aspect=aspect, width=width, titled=names is not None, key=labels.size
+        len(several), columns=columns, aspect=aspect, width=width, titled=names is not None, key=words
     )
     for i, (part, ax) in enumerate(zip(several, axes, strict=True)):
         draw_parts(part, ax, boundary=boundary, view=view, mesh=meshes[i] if meshes else None)
         _fill_panel(ax)
         ax.set_title(names[i] if names else "", fontsize=TITLE_SIZE, color=INK, pad=4)
-    colour_key(figure, part_colours(labels), _words(labels, several))
+    colour_key(figure, part_colours(labels), words)
     return figure
 
 
