@@ -15,7 +15,8 @@ from spem.fields.sources import point_sources
 from spem.plots.boundary_lines import draw_boundary
 from spem.plots.layout import colour_key, panels
 from spem.plots.part_components import figure_components
-from spem.plots.parts import TONE, draw_parts, figure_parts, picture_parts
+from spem.plots.part_pictures import TONE, draw_parts, picture_parts
+from spem.plots.parts import figure_parts
 from spem.plots.style import NO_PART, PART_COLOURS, new_figure, part_colours
 from spem.shapes.shape import Shape
 
