@@ -13,7 +13,7 @@ import pytest
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 KEYS = {"benchmark", "quick", "machine", "facts", "tables", "targets", "skipped"}
-WITHOUT_DATA = ("convergence", "startup", "sweep_accuracy", "sweep_scaling")
+WITHOUT_DATA = ("convergence", "source_accuracy", "startup", "sweep_accuracy", "sweep_scaling")
 
 
 def _run(name: str, out: Path, **environment: str) -> dict:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from spem.errors import ParameterError, SizeError
 from spem.fields.rho import check_rho
 from spem.fields.solvers.protocol import SourceSolver
+from spem.fields.source_axes import Index, numbers, samples
 from spem.fields.source_blocks import Blocks, KeptBlocks, SolvedBlocks
 from spem.fields.source_fields import Progress, SourceFields, block_size
 from spem.fields.source_slice import source_solver
@@ -24,9 +25,7 @@ if TYPE_CHECKING:
 
 # A block is read as a whole, so it is kept below this size where a field is.
 _BLOCK_BYTES = 16 << 20
-# Two ρ are the same sample within rounding.
-_SAME = 1e-9
-Index = NDArray[np.int64]
+Key = int | Index | slice
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +129,7 @@ class SourceHyperfield:
         SizeError
             If what is asked for does not fit in half of the memory limit.
         """
-        return self.take((self._samples(rho), *self._numbers(sources, nodes)), log=True)
+        return self.take(self._key(rho, sources, nodes), log=True)
 
     def values(
         self,
@@ -139,7 +138,7 @@ class SourceHyperfield:
         nodes: ArrayLike | slice | None = None,
     ) -> NDArray[np.float64]:
         """Fields themselves, 0 below the range of float64; parameters and result as those of `log`."""
-        return self.take((self._samples(rho), *self._numbers(sources, nodes)), log=False)
+        return self.take(self._key(rho, sources, nodes), log=False)
 
     def fields(self, rho: float) -> SourceFields:
         """Materialise the slice of one sampled ρ."""
@@ -152,18 +151,16 @@ class SourceHyperfield:
         -------
         ``(n_nodes,)`` for one ρ, ``(n_rho, n_nodes)`` for several or all.
         """
-        samples = self._samples(rho)
+        at = samples(self.rho, rho, self.shape.name)
         n_sources, n_nodes = self.size[1:]
-        sums = np.zeros((np.size(samples), n_nodes))
-        for row, index in zip(sums, np.atleast_1d(samples), strict=True):
+        sums = np.zeros((at.size, n_nodes))
+        for row, index in zip(sums, np.atleast_1d(at), strict=True):
             for start in range(0, n_sources, self._blocks.size):
                 block = np.arange(start, min(start + self._blocks.size, n_sources))
                 row += self.take((index, block, slice(None)), log=False).sum(axis=0)
-        return sums[0] if np.ndim(samples) == 0 else sums
+        return sums[0] if at.ndim == 0 else sums
 
-    def take(
-        self, key: tuple[int | Index | slice, int | Index | slice, int | Index | slice], *, log: bool
-    ) -> NDArray[np.float64]:
+    def take(self, key: tuple[Key, Key, Key], *, log: bool) -> NDArray[np.float64]:
         """Read fields by position along each axis, ρ, source and node; axes indexed by one number vanish.
 
         Only the blocks that hold what is asked for are solved or read.
@@ -218,37 +215,13 @@ class SourceHyperfield:
 
         return load_source_hyperfield(path, memory_limit)
 
-    def _samples(self, rho: ArrayLike | None) -> Index:
-        """Positions of ρ among the samples."""
-        if rho is None:
-            return np.arange(self.rho.size)
-        wanted = check_rho(rho)
-        with np.errstate(invalid="ignore"):
-            near = np.isclose(wanted[:, None], self.rho, rtol=_SAME, atol=0.0)
-        if not near.any(axis=1).all():
-            stray = wanted[np.argmin(near.any(axis=1))]
-            sampled = f"{self.rho.size} from {self.rho.min():g} to {self.rho.max():g}"
-            msg = f"rho={stray:g}: {self.shape.name} is sampled at {sampled}; see rho of the hyperfield"
-            raise ParameterError(msg)
-        position = near.argmax(axis=1)
-        return np.asarray(position[0] if np.ndim(rho) == 0 else position)
-
-    def _numbers(
-        self, sources: ArrayLike | slice | None, nodes: ArrayLike | slice | None
-    ) -> tuple[Index, Index]:
-        """Return sources and nodes as numbers in range."""
-        names, asked = ("sources", "nodes"), (sources, nodes)
-        result = []
-        for what, count, wanted in zip(names, self.size[1:], asked, strict=True):
-            chosen = slice(None) if wanted is None else wanted
-            try:
-                key = chosen if isinstance(chosen, slice) else np.asarray(chosen)
-                empty = not isinstance(key, slice) and key.size == 0  # whose type is float
-                result.append(np.arange(0) if empty else np.asarray(np.arange(count)[key]))
-            except IndexError as error:
-                msg = f"{what}={wanted!r}: expected numbers from 0 to {count - 1} ({error})"
-                raise ParameterError(msg) from error
-        return result[0], result[1]
+    def _key(
+        self, rho: ArrayLike | None, sources: ArrayLike | slice | None, nodes: ArrayLike | slice | None
+    ) -> tuple[Index, Index, Index]:
+        """Return what is asked for as positions along each axis."""
+        _, n_sources, n_nodes = self.size
+        at = samples(self.rho, rho, self.shape.name)
+        return at, numbers(n_sources, sources, "sources"), numbers(n_nodes, nodes, "nodes")
 
     def _check_log(self, log: bool) -> None:
         """Refuse logarithms of fields that are right only relative to their maximum."""

@@ -34,9 +34,10 @@ def scaled(rhs: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
 
 def logs(solution: NDArray[np.float64], exponent: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Logarithms ``(k, n_nodes)`` of a scaled solution ``(n_nodes, k)``, and which are too small to trust."""
-    rows = np.ascontiguousarray(solution.T)
+    log = np.array(solution.T, order="C")
     with np.errstate(divide="ignore", under="ignore"):
-        log = np.log(np.ldexp(rows, -exponent))
+        np.ldexp(log, -exponent, out=log)
+        np.log(log, out=log)
     return log, log < _TRUSTED * _LN2
 
 
