@@ -72,8 +72,8 @@ def solve_sources(
     solver
         One that is right in every entry: `Direct`, the default.
     memory_limit
-        Bytes for the result and the fields in work, beside the matrix and its factor; None for SPEM_MEMORY_LIMIT
-        or the default of 2 GiB.
+        Bytes for the result and the fields in work, beside the matrix and its factor; None for
+        SPEM_MEMORY_LIMIT or the default of 2 GiB.
     progress
         Called with ``"sources"``, the number of fields solved and that of all.
 
