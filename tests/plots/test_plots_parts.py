@@ -17,7 +17,7 @@ from spem.plots.layout import colour_key, panels
 from spem.plots.part_components import figure_components
 from spem.plots.part_pictures import TONE, draw_parts, picture_parts
 from spem.plots.parts import figure_parts
-from spem.plots.style import NO_PART, PART_COLOURS, new_figure, part_colours
+from spem.plots.style import INK, NO_PART, PART_COLOURS, new_figure, part_colours
 from spem.shapes.shape import Shape
 
 
@@ -106,6 +106,12 @@ def test_numbers_stand_in_their_parts():
     assert not tight.texts
     _, bare = drawn(parts, numbers=False)
     assert not bare.texts
+
+
+def test_numbers_can_be_read_on_dark_parts():
+    """On the full blue the number is white, on the orange it is ink."""
+    _, ax = drawn(halves(8, 20), boundary=False)
+    assert {text.get_text(): text.get_color() for text in ax.texts} == {"0": "white", "1": INK}
 
 
 def test_key_names_each_label_once_for_all_shapes():

@@ -10,7 +10,7 @@ from spem.errors import ParameterError
 from spem.plots.camera import picture_aspect, principal_view, view_rotation
 from spem.plots.fields import draw_line, draw_outline, draw_slice, draw_values
 from spem.plots.layout import colour_bar, curve_panels, panels
-from spem.plots.raster import render_surface
+from spem.plots.raster import SHARPNESS, render_surface
 from spem.plots.style import FIELD_CMAP, MAP_CMAP, TEXT_SIZE, bare, figure_png
 from spem.plots.surfaces import shape_surface, surface_values
 from spem.plots.values import node_columns, value_limits
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from spem.plots.camera import View
     from spem.shapes.shape import Shape
 
-# Pixels of a shaded picture for each of the figure: a little finer.
-SHARPNESS = 1.35
 # Panels of the map pictures in reports, in inches: narrow beside their titles.
 MAP_WIDTH = 1.5
 

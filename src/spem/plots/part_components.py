@@ -11,7 +11,7 @@ from spem.plots.boundary_lines import draw_boundary
 from spem.plots.camera import picture_aspect, principal_view, view_rotation
 from spem.plots.fields import draw_line, draw_values
 from spem.plots.layout import curve_panels, panels
-from spem.plots.raster import render_surface
+from spem.plots.raster import SHARPNESS, render_surface
 from spem.plots.style import TEXT_SIZE, bare, part_colours
 from spem.plots.surfaces import shape_surface, surface_values
 from spem.plots.values import require_drawable
@@ -34,8 +34,6 @@ DARK = 0.72
 WIDTHS = (0.7, 3.0)
 # Steps of the colour of a boundary.
 STEPS = 32
-# Pixels of a shaded picture for each of the figure.
-SHARPNESS = 1.35
 
 
 def figure_components(

@@ -14,7 +14,7 @@ from spem.plots.fields import draw_outline
 from spem.plots.level import surface_level
 from spem.plots.part_surface import part_surface
 from spem.plots.plane import clip_to, contour_lines, extent
-from spem.plots.raster import render_surface
+from spem.plots.raster import SHARPNESS, render_surface
 from spem.plots.style import INK, TEXT_SIZE, bare, part_colours
 from spem.plots.values import require_drawable
 
@@ -37,8 +37,9 @@ TONE = 0.35
 OUTLINE = 2.2
 # A number is written in a part whose inner radius in points is at least this.
 ROOM = 4.5
-# Pixels of a shaded picture for each of the figure.
-SHARPNESS = 1.35
+# How much red, green and blue count for lightness; below the second, numbers are white.
+LIGHTNESS = (0.299, 0.587, 0.114)
+DARK = 0.48
 
 
 def draw_parts(
@@ -95,7 +96,7 @@ def draw_parts(
     else:
         draw_outline(shape, ax, width=0.8)
     if numbers:
-        _number(shape, parts.node_labels, ax)
+        _number(shape, parts.node_labels, ax, TONE if boundary else 0.0)
     return image
 
 
@@ -173,7 +174,7 @@ def _draw_region(shape: Shape, node_labels: NDArray[np.int32], ax: Axes, tone: f
     index = (np.argwhere(near) + 0.5) / scale - 0.5
     colours = part_colours(Borders.of(shape, node_labels).at(index))
     picture = np.zeros((*near.shape, 4))
-    picture[near, :3] = colours + tone * (1 - colours)
+    picture[near, :3] = _toned(colours, tone)
     picture[near, 3] = 1.0
     image = ax.imshow(picture, extent=extent(shape), interpolation="antialiased", aspect="equal")
     clip_to(image, ax, contour_lines(shape, surface_level(shape)))
@@ -181,8 +182,13 @@ def _draw_region(shape: Shape, node_labels: NDArray[np.int32], ax: Axes, tone: f
     return image
 
 
-def _number(shape: Shape, node_labels: NDArray[np.int32], ax: Axes) -> list[Text]:
-    """Write the label of each part where it is widest, if it is wide enough."""
+def _toned(colours: NDArray[np.float64], tone: float) -> NDArray[np.float64]:
+    """Colours part of the way to white."""
+    return np.asarray(colours + tone * (1 - colours))
+
+
+def _number(shape: Shape, node_labels: NDArray[np.int32], ax: Axes, tone: float) -> list[Text]:
+    """Write the label of each part where it is widest, if it is wide enough; white in dark parts."""
     points_per_unit = 72 / ax.figure.dpi * ax.bbox.width / np.ptp(ax.get_xlim())
     written = []
     for label in np.unique(node_labels[node_labels >= 0]):
@@ -191,7 +197,9 @@ def _number(shape: Shape, node_labels: NDArray[np.int32], ax: Axes) -> list[Text
         if room[row, column] * points_per_unit < ROOM:
             continue
         y, x = np.asarray(shape.origin) + np.array([row, column]) * np.asarray(shape.spacing)
+        light = _toned(part_colours([label]), tone)[0] @ LIGHTNESS
+        ink = INK if light > DARK else "white"
         written.append(
-            ax.text(x, y, str(label), ha="center", va="center_baseline", fontsize=TEXT_SIZE - 1, color=INK)
+            ax.text(x, y, str(label), ha="center", va="center_baseline", fontsize=TEXT_SIZE - 1, color=ink)
         )
     return written
