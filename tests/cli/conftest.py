@@ -24,6 +24,21 @@ def spem() -> Callable[..., Result]:
 
 
 @pytest.fixture
+def refused() -> Callable[..., None]:
+    """Return a check for one line on stderr with the given words, and exit status 2."""
+
+    def refused(result: Result, *words: str) -> None:
+        assert result.exit_code == 2, result.output
+        lines = result.stderr.strip().splitlines()
+        assert len(lines) == 1, result.stderr
+        assert lines[0].startswith("spem: ")
+        for word in words:
+            assert word in lines[0]
+
+    return refused
+
+
+@pytest.fixture
 def start() -> Callable[..., subprocess.Popen[str]]:
     """Return a start of the command line in a process group of its own."""
 

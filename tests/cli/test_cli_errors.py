@@ -14,16 +14,7 @@ from typer.testing import Result
 import spem as package
 
 Spem = Callable[..., Result]
-
-
-def refused(result: Result, *words: str) -> None:
-    """Check for one line on stderr with these words, and exit status 2."""
-    assert result.exit_code == 2, result.output
-    lines = result.stderr.strip().splitlines()
-    assert len(lines) == 1, result.stderr
-    assert lines[0].startswith("spem: ")
-    for word in words:
-        assert word in lines[0]
+Refused = Callable[..., None]
 
 
 def _bad(tmp_path: Path, kind: str) -> Path:
@@ -44,7 +35,7 @@ def _bad(tmp_path: Path, kind: str) -> Path:
 
 
 @pytest.mark.parametrize("kind", ["missing", "empty", "cut", "typed", "text", "nan", "void"])
-def test_bad_files(spem: Spem, tmp_path: Path, kind: str) -> None:
+def test_bad_files(spem: Spem, refused: Refused, tmp_path: Path, kind: str) -> None:
     """Files that are missing, empty, cut short, of another kind, or hold no shape are refused by name."""
     path = _bad(tmp_path, kind)
     refused(spem("info", path), "bad")
@@ -52,20 +43,20 @@ def test_bad_files(spem: Spem, tmp_path: Path, kind: str) -> None:
     assert not (tmp_path / "f.npz").exists()
 
 
-def test_image_of_one_value(spem: Spem, tmp_path: Path) -> None:
+def test_image_of_one_value(spem: Spem, refused: Refused, tmp_path: Path) -> None:
     """A blank picture holds no shape."""
     Image.new("L", (20, 20), 255).save(tmp_path / "blank.png")
     refused(spem("info", tmp_path / "blank.png"), "blank")
 
 
-def test_mesh_without_an_interior_node(spem: Spem, tmp_path: Path) -> None:
+def test_mesh_without_an_interior_node(spem: Spem, refused: Refused, tmp_path: Path) -> None:
     """A mesh without volume is refused by name."""
     (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     refused(spem("info", tmp_path / "flat.obj"), "flat")
 
 
 @pytest.mark.parametrize("rho", ["0", "-1", "nan"])
-def test_bad_rho(spem: Spem, image: Path, tmp_path: Path, rho: str) -> None:
+def test_bad_rho(spem: Spem, refused: Refused, image: Path, tmp_path: Path, rho: str) -> None:
     """Screening lengths that are not positive are refused."""
     refused(spem("field", image, f"--rho={rho}", "-o", tmp_path / "f.npz"), "rho", "positive")
 
@@ -83,12 +74,14 @@ def test_bad_rho(spem: Spem, image: Path, tmp_path: Path, rho: str) -> None:
         (("--label", "3"), "label"),
     ],
 )
-def test_bad_options(spem: Spem, image: Path, tmp_path: Path, options: tuple[str, ...], word: str) -> None:
+def test_bad_options(
+    spem: Spem, refused: Refused, image: Path, tmp_path: Path, options: tuple[str, ...], word: str
+) -> None:
     """Options out of range, or that do not go together, are named."""
     refused(spem("maps", image, *options, "-o", tmp_path / "m.npz"), word)
 
 
-def test_unknown_label(spem: Spem, tmp_path: Path) -> None:
+def test_unknown_label(spem: Spem, refused: Refused, tmp_path: Path) -> None:
     """A label that the volume does not have is refused."""
     np.save(tmp_path / "labels.npy", [[0, 3, 3, 0, 7], [0, 3, 3, 0, 7]])
     refused(spem("info", tmp_path / "labels.npy", "--label", "5"), "5", "3")
@@ -97,7 +90,9 @@ def test_unknown_label(spem: Spem, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("target", "word"), [("file/f.npz", "folder cannot be made"), ("f.txt", ".npz"), ("d.npz", "is a folder")]
 )
-def test_targets_are_checked_first(spem: Spem, tmp_path: Path, target: str, word: str) -> None:
+def test_targets_are_checked_first(
+    spem: Spem, refused: Refused, tmp_path: Path, target: str, word: str
+) -> None:
     """Output that cannot be written is refused before the shape is even read."""
     (tmp_path / "file").write_text("")
     (tmp_path / "d.npz").mkdir()
@@ -105,18 +100,18 @@ def test_targets_are_checked_first(spem: Spem, tmp_path: Path, target: str, word
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write to every folder")
-def test_folder_without_permission(spem: Spem, image: Path, tmp_path: Path) -> None:
+def test_folder_without_permission(spem: Spem, refused: Refused, image: Path, tmp_path: Path) -> None:
     """A folder that may not be written to is named."""
     (tmp_path / "locked").mkdir(mode=0o500)
     refused(spem("field", image, "--rho", "2", "-o", tmp_path / "locked" / "f.npz"), "no permission")
 
 
-def test_nothing_to_write(spem: Spem, image: Path) -> None:
+def test_nothing_to_write(spem: Spem, refused: Refused, image: Path) -> None:
     """`field` without a file to write is told so."""
     refused(spem("field", image, "--rho", "2"), "nothing to write")
 
 
-def test_four_dimensions_cannot_be_drawn(spem: Spem, tmp_path: Path) -> None:
+def test_four_dimensions_cannot_be_drawn(spem: Spem, refused: Refused, tmp_path: Path) -> None:
     """A picture of a shape in four dimensions is refused before it is solved, with what to do."""
     np.save(tmp_path / "four.npy", np.pad(np.ones((3,) * 4, bool), 1))
     result = spem("field", tmp_path / "four.npy", "--rho", "2", "--plot", tmp_path / "p.png")
@@ -134,7 +129,7 @@ def test_four_dimensions_cannot_be_drawn(spem: Spem, tmp_path: Path) -> None:
     ],
 )
 def test_wrong_usage_is_one_line(
-    spem: Spem, image: Path, tmp_path: Path, options: tuple[str, ...], word: str
+    spem: Spem, refused: Refused, image: Path, tmp_path: Path, options: tuple[str, ...], word: str
 ) -> None:
     """What the parser refuses is told as any other error, on one line."""
     result = spem("field", image, "-o", tmp_path / "f.npz", *options)
@@ -143,13 +138,13 @@ def test_wrong_usage_is_one_line(
 
 
 @pytest.mark.parametrize("name", ["none.png", "none.npy", "none.obj", "none.xyz"])
-def test_missing_files_are_told_alike(spem: Spem, tmp_path: Path, name: str) -> None:
+def test_missing_files_are_told_alike(spem: Spem, refused: Refused, tmp_path: Path, name: str) -> None:
     """A file that is not there is told in the same words whatever its kind."""
     refused(spem("info", tmp_path / name), f"{name}: no such file; check the path")
     refused(spem("evaluate", tmp_path / name, "--labels", "x.csv"), f"{name}: no such file")
 
 
-def test_sources_that_are_no_files(spem: Spem, image: Path, tmp_path: Path) -> None:
+def test_sources_that_are_no_files(spem: Spem, refused: Refused, image: Path, tmp_path: Path) -> None:
     """A folder, an empty name, Python objects and faces without their vertices are told as such."""
     refused(spem("info", tmp_path), "is a folder")
     refused(spem("info", ""), "empty name")
@@ -161,7 +156,7 @@ def test_sources_that_are_no_files(spem: Spem, image: Path, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("options", [(), ("--overwrite",)])
 def test_codes_do_not_replace_an_image(
-    spem: Spem, image: Path, mesh: Path, tmp_path: Path, options: tuple[str, ...]
+    spem: Spem, refused: Refused, image: Path, mesh: Path, tmp_path: Path, options: tuple[str, ...]
 ) -> None:
     """An image under the name of the codes is neither read as codes nor lost."""
     target = tmp_path / "hand.png"
@@ -170,7 +165,9 @@ def test_codes_do_not_replace_an_image(
     assert target.read_bytes() == image.read_bytes()
 
 
-def test_unexpected_error_is_one_line(spem: Spem, image: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unexpected_error_is_one_line(
+    spem: Spem, refused: Refused, image: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """An error that nobody foresaw is named with its type; SPEM_DEBUG=1 gives the traceback."""
     monkeypatch.setattr("spem.shapes.read.read", lambda *_, **__: 1 / 0)
     refused(spem("info", image), "unexpected ZeroDivisionError", "please report")

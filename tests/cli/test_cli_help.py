@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from enum import StrEnum
+from inspect import signature
 from typing import get_args
 
 import pytest
@@ -18,7 +19,7 @@ from spem.codes.settings import Components, Settings
 from spem.fields.operator import Boundary
 from spem.fields.rho import Scheme
 
-COMMANDS = ("info", "field", "maps", "encode", "search", "evaluate", "demo")
+COMMANDS = ("info", "field", "maps", "parts", "encode", "search", "evaluate", "demo")
 HEAVY = (
     "numba",
     "scipy",
@@ -63,6 +64,15 @@ def test_defaults_of_codes_are_shown(spem: Callable[..., Result]) -> None:
     for name in ("n_maps", "n_centers", "power", "moments", "scaling"):
         assert f"[{getattr(default, name)}]" in text.split(f"--{name.replace('_', '-')} ")[1][:140]
     assert ", ".join(get_args(Scaling)[:-1]) in text
+
+
+def test_defaults_of_parts_are_those_of_the_library(spem: Callable[..., Result]) -> None:
+    """The help of `parts` has the default sparsity and number of parts of the facade."""
+    text = " ".join(spem("parts", "--help").stdout.split())
+    default = {name: option.default for name, option in signature(package.parts).parameters.items()}
+    assert f"[default: {default['sparsity']}]" in text.split("--sparsity ")[1][:140]
+    assert f"[{default['n_parts']}; 16]" in text.split("--n-parts ")[1][:140]
+    assert f"[default: {default['boundary']}]" in text.split("--boundary ")[1][:140]
 
 
 def test_version(spem: Callable[..., Result]) -> None:

@@ -20,6 +20,7 @@ from spem.cli.fields import field
 from spem.cli.info import info
 from spem.cli.maps import maps
 from spem.cli.output import complain
+from spem.cli.parts import parts
 from spem.cli.search import evaluate, search
 from spem.errors import SizeError, SpemError
 
@@ -84,7 +85,7 @@ def _spem(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
     ] = False,
 ) -> None:
-    """Screened Poisson hyperfields: fields, SPEM maps, codes and search for shapes of any dimension.
+    """Screened Poisson hyperfields: fields, SPEM maps, parts, codes and search for shapes of any dimension.
 
     SHAPE is an image (PNG, GIF, JPEG, BMP, TIFF, WebP, PNM), a volume (NPY, NPZ, NIfTI, TIFF stack) or a mesh
     (OBJ, OFF, PLY, STL, GLB).
@@ -94,6 +95,7 @@ def _spem(
       spem demo                                   a collection, its codes, answers, scores and pictures
       spem info hand.png                          what was read, what was repaired
       spem field hand.png --rho 4 --rho 16 -o hand.npz --plot fields.png
+      spem parts hand.png -o hand.npz --plot parts.png
       spem encode shapes/ -o shapes.spem          codes of a folder
       spem search shapes.spem query.obj           the most similar shapes
 
@@ -154,7 +156,7 @@ def _refuse(message: str) -> None:
     raise typer.Exit(NOTHING) from None
 
 
-for _command in (info, field, maps, encode, search, evaluate, demo):
+for _command in (info, field, maps, parts, encode, search, evaluate, demo):
     app.command()(guarded(_command))
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spem.api.parts import sources as boundary_sources
+from spem.cli.division import naming_options, patch_boundary
 from spem.cli.output import complain, counted, write_figure, write_npz
 from spem.cli.progress import Bar
 from spem.cli.results import about, summarise
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from spem.shapes.shape import Shape
-
-PATCHES = 200
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ def write_sources(
         When a place is no point near the boundary, or the fields do not fit in memory.
     """
     chosen, distance, lines = _choose(shape, request)
-    with Bar() as bar:
+    with naming_options(), Bar() as bar:
         fields = [solve_sources(chosen, float(value), progress=bar.advance) for value in rho]
     log = np.stack([field.log.T for field in fields], axis=1)  # (n_nodes, n_rho, n_sources)
     with np.errstate(under="ignore"):
@@ -118,7 +117,10 @@ def _choose(shape: Shape, request: SourceRequest) -> tuple[Sources, NDArray[np.f
     """Find the sources asked for, how far they are from where they were asked for, and what to tell."""
     option = "--patch" if request.as_patches else "--source"
     places = [read_point(text, shape, option) for text in request.places]
-    found = _patches(shape, request) if request.as_patches else _points(shape, request)
+    if request.as_patches:
+        found = patch_boundary(shape, request.n_patches, request.boundary)
+    else:
+        found = boundary_sources(shape, boundary=request.boundary)
     numbers, distance = found.nearest(places)
     chosen = found.select(numbers)
     lines = []
@@ -130,20 +132,6 @@ def _choose(shape: Shape, request: SourceRequest) -> tuple[Sources, NDArray[np.f
             what = f"boundary node {numbers[i]} of {found.n_sources} at {place},"
         lines.append(f"{option} {text}: {what} {distance[i]:.4g} away")
     return chosen, distance, lines
-
-
-def _points(shape: Shape, request: SourceRequest) -> Sources:
-    """Make every boundary node a source."""
-    return boundary_sources(shape, boundary=request.boundary)
-
-
-def _patches(shape: Shape, request: SourceRequest) -> Sources:
-    """Divide the boundary into patches: as many as asked for, or 200 where it has as many points."""
-    count = request.n_patches
-    if count is None:
-        points = _points(shape, request).points
-        count = max(min(PATCHES, points.n_points), points.n_contours)
-    return boundary_sources(shape, count, boundary=request.boundary)
 
 
 def _tell_unreached(log: NDArray[np.float64]) -> None:

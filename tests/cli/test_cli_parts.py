@@ -1,0 +1,231 @@
+"""spem parts: arrays, tables, pictures, pages and meshes of parts, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+from typer.testing import Result
+
+import spem as package
+
+Spem = Callable[..., Result]
+Refused = Callable[..., None]
+
+
+def dumbbell() -> np.ndarray:
+    """Return the mask of two squares of 8 x 8 pixels joined by a bar."""
+    mask = np.zeros((12, 28), bool)
+    mask[2:10, 2:10] = mask[2:10, 18:26] = mask[5:7, 10:18] = True
+    return mask
+
+
+@pytest.fixture
+def bone(tmp_path: Path) -> Path:
+    """Return a picture of the dumbbell."""
+    path = tmp_path / "bone.png"
+    Image.fromarray(255 * dumbbell().astype(np.uint8)).save(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def solid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a mesh of two boxes joined by a bar."""
+    path = tmp_path_factory.mktemp("solid") / "bone.obj"
+    boxes = [((4, 4, 4), -6), ((10, 1.5, 1.5), 0), ((4, 4, 4), 6)]
+    whole = trimesh.util.concatenate(
+        [
+            trimesh.creation.box(size, trimesh.transformations.translation_matrix((x, 0, 0)))
+            for size, x in boxes
+        ]
+    )
+    whole.export(path)
+    return path
+
+
+def test_parts_are_written(spem: Spem, bone: Path, tmp_path: Path) -> None:
+    """Two parts of a dumbbell are its ends; the file is read back as parts, and by plain NumPy."""
+    target = tmp_path / "new" / "p.npz"
+    result = spem("parts", bone, "-k", "2", "-o", target)
+    assert result.exit_code == 0, result.stderr
+    assert "Parts('bone', 2 parts of its region" in result.stdout
+    assert f"wrote {target}" in result.stdout
+    with np.load(target) as found:
+        own = {"points", "labels", "components", "basis", "sources", "source_labels", "intensity", "rho"}
+        assert own <= set(found)
+        n, m = len(found["points"]), len(found["sources"])
+        assert found["components"].shape == (2, n)
+        assert found["basis"].shape == (2, m)
+        left, right = (set(found["labels"][found["points"][:, 1] // 14 == side]) - {-1} for side in (0, 1))
+    assert {*left, *right} == {0, 1}
+    assert len(left) == len(right) == 1
+    assert package.Parts.load(target).n_parts == 2
+
+
+def test_summary_for_machines(spem: Spem, bone: Path, tmp_path: Path) -> None:
+    """--json tells of shape, sources, sizes, intensities and files, and repeats what was asked."""
+    target = tmp_path / "p.npz"
+    options = ("-k", "3", "--sparsity", "0.05", "--rho", "4", "--boundary-parts", "--seed", "2")
+    summary = json.loads(spem("parts", bone, *options, "-o", target, "--json").stdout)
+    assert (summary["name"], summary["voxels"], summary["n_parts"]) == ("bone", 144, 3)
+    assert (summary["over"], summary["boundary"], summary["rho"]) == ("boundary", "voxel", 4.0)
+    assert (summary["sparsity"], summary["seed"], summary["output"]) == (0.05, 2, str(target))
+    assert sum(summary["sizes"]) + summary["unexplained"] == pytest.approx(1)
+    assert sum(summary["intensity"]) == pytest.approx(1)
+    parts = package.Parts.load(target)
+    assert (parts.over, parts.rho, parts.sources.n_sources) == ("boundary", 4.0, summary["n_sources"])
+    assert parts.components.shape == (3, summary["n_sources"])
+
+
+def test_parts_are_those_of_the_library(spem: Spem, bone: Path, tmp_path: Path) -> None:
+    """The command gives what `spem.parts` gives with the same options, and the same again."""
+    for name in ("a.npz", "b.npz"):
+        assert spem("parts", bone, "-k", "4", "--patches", "20", "-o", tmp_path / name).exit_code == 0
+    expected = package.parts(package.read(bone), 4, n_patches=20, rng=np.random.default_rng(0))
+    for name in ("a.npz", "b.npz"):
+        found = package.Parts.load(tmp_path / name)
+        np.testing.assert_array_equal(found.node_labels, expected.node_labels)
+
+
+def test_number_of_parts_by_the_curve(spem: Spem, bone: Path, tmp_path: Path) -> None:
+    """--curve prints and draws the error against k; -k auto takes the k that it suggests."""
+    plot = tmp_path / "curve.png"
+    result = spem("parts", bone, "--curve", "-k", "6", "--plot", plot)
+    assert result.exit_code == 0, result.stderr
+    lines = result.stdout.splitlines()
+    assert [line.split()[0] for line in lines[2:8]] == list("123456")
+    assert plot.read_bytes()[:4] == b"\x89PNG"
+    curve = json.loads(spem("parts", bone, "--curve", "--json").stdout)
+    assert curve["k"] == list(range(1, 17))
+    assert (np.diff(curve["error"]) <= 0).all()
+    auto = json.loads(spem("parts", bone, "-k", "auto", "-o", tmp_path / "p.npz", "--json").stdout)
+    assert auto["n_parts"] == curve["suggested"]
+
+
+def test_pictures_of_a_solid(spem: Spem, solid: Path, tmp_path: Path) -> None:
+    """Of a mesh there are a picture, a page, and a PLY file with its own vertices, labelled."""
+    plot, page, mesh = (tmp_path / name for name in ("p.png", "p.html", "p.ply"))
+    options = ("-k", "2", "--patches", "30", "--voxels", "600", "--components", "all")
+    result = spem("parts", solid, *options, "--plot", plot, "--page", page, "--mesh", mesh)
+    assert result.exit_code == 0, result.stderr
+    assert plot.read_bytes()[:4] == b"\x89PNG"
+    assert "<canvas" in page.read_text(encoding="utf-8")
+    found, original = (trimesh.load(path, process=False) for path in (mesh, solid))
+    np.testing.assert_allclose(found.vertices, original.vertices)
+    np.testing.assert_array_equal(found.faces, original.faces)
+    labels = np.asarray(found.metadata["_ply_raw"]["vertex"]["data"]["label"]).ravel()
+    assert len({*labels[found.vertices[:, 0] < -4]}) == len({*labels[found.vertices[:, 0] > 4]}) == 1
+    assert len(set(labels)) == 2
+
+
+def test_parts_of_a_volume(spem: Spem, tmp_path: Path) -> None:
+    """A solid without a mesh has a surface of its own; default patches are no more than its points."""
+    np.save(tmp_path / "rod.npy", np.pad(np.ones((2, 2, 7), bool), 1))
+    mesh = tmp_path / "p.ply"
+    result = spem("parts", tmp_path / "rod.npy", "-k", "2", "--mesh", mesh)
+    assert result.exit_code == 0, result.stderr
+    assert len(trimesh.load(mesh).faces) > 50
+
+
+def test_components_apart_have_parts_apart(spem: Spem, tmp_path: Path) -> None:
+    """Sources do not reach other components: no part lies in two of them, and nothing is NaN."""
+    np.save(tmp_path / "two.npy", np.pad(np.kron([[1, 0, 1]], np.ones((5, 5), bool)), 1) > 0)
+    target = tmp_path / "p.npz"
+    result = spem("parts", tmp_path / "two.npy", "--components", "all", "-k", "2", "-o", target)
+    assert result.exit_code == 0, result.stderr
+    with np.load(target) as found:
+        assert np.isfinite(found["components"]).all()
+        assert np.isfinite(found["basis"]).all()
+        sides = [set(found["labels"][found["points"][:, 1] // 8 == side]) - {-1} for side in (0, 1)]
+    assert sides in ([{0}, {1}], [{1}, {0}])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("-k", "0"), ("-k 0: expected a number of parts from 1 on, or auto",)),
+        (("-k", "x"), ("-k x: expected a number of parts from 1 on, or auto",)),
+        (("-k", "500"), ("-k 500: bone has 72 sources and 144 nodes; expected at most 72",)),
+        (("--patches", "5", "-k", "6"), ("-k 6: bone has 5 sources",)),
+        (("--patches", "999"), ("too few for 999 patches",)),
+        (("--sparsity", "-0.1"), ("--sparsity -0.1: expected 0 to less than 1, where all codes vanish",)),
+        (("--sparsity", "1"), ("--sparsity 1: expected 0 to less than 1",)),
+        (("--sparsity", "nan"), ("--sparsity nan",)),
+        (("--rho", "0"), ("--rho 0: expected a length above zero, or inf",)),
+        (("--rho", "nan"), ("--rho nan",)),
+        (("--rho", "1e-200"), ("rho", "or inf")),
+        (("--curve",), ("--curve makes no parts",)),
+        (("--page", "p.html"), ("bone: has 2 dimensions; --page takes shapes of 3",)),
+        (("--mesh", "p.ply"), ("bone: has 2 dimensions; --mesh takes shapes of 3",)),
+        (("--page", "p.txt"), ("p.txt: expected a file that ends in .html",)),
+        (("--mesh", "p.obj"), ("p.obj: expected a file that ends in .ply",)),
+        (("--plot", "p.bmp"), ("p.bmp: expected a file that ends in .png",)),
+        (("-o", "p.txt"), ("p.txt: expected a file that ends in .npz",)),
+        (("--plot", "bone.png"), ("bone.png: is a file that is read",)),
+        (("--seed", "-1"), ("--seed",)),
+    ],
+)
+def test_wrong_requests(
+    spem: Spem,
+    refused: Refused,
+    bone: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    options: tuple[str, ...],
+    words: tuple[str, ...],
+) -> None:
+    """Numbers out of range, files of other kinds and options at odds are refused, and nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    refused(spem("parts", bone, "-o", "p.npz", *options), *words)
+    assert [path.name for path in tmp_path.iterdir()] == ["bone.png"]
+
+
+def test_nothing_to_write(spem: Spem, refused: Refused, bone: Path) -> None:
+    """`parts` without a file to write is told so before the shape is read."""
+    refused(spem("parts", "no-such-shape.png"), "nothing to write", "--page")
+    refused(spem("parts", "no-such-shape.png", "-o", "p.npz"), "no-such-shape.png: no such file")
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [((), "-k 8: one has 4 sources and 1 node; expected at most 1"), (("-k", "1"), "nothing to divide")],
+)
+def test_one_pixel(spem: Spem, tmp_path: Path, options: tuple[str, ...], word: str) -> None:
+    """A shape of one node, which is warned of when it is read, has no parts."""
+    np.save(tmp_path / "one.npy", np.pad([[1]], 1))
+    result = spem("parts", tmp_path / "one.npy", *options, "-o", tmp_path / "p.npz")
+    assert result.exit_code == 2
+    warning, error = result.stderr.splitlines()
+    assert "only 1 node inside" in warning
+    assert word in error
+
+
+def test_sources_that_do_not_fit_in_memory(
+    spem: Spem, refused: Refused, bone: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More sources than the memory limit allows are refused with how many fit and the options that help."""
+    monkeypatch.setenv("SPEM_MEMORY_LIMIT", "60K")
+    result = spem("parts", bone, "-o", tmp_path / "p.npz")
+    refused(
+        result, "bone: 72 fields of 144 nodes need", "would fit; ask for fewer sources, as with --patches M"
+    )
+    assert spem("parts", bone, "--patches", "20", "-o", tmp_path / "p.npz").exit_code == 0
+
+
+def test_interrupted_run_leaves_nothing(
+    spem: Spem, bone: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C while a file is written leaves no part of it, and exit status 130."""
+
+    def stop(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("spem.decomposition.parts_files.np.savez", stop)
+    result = spem("parts", bone, "-k", "2", "-o", tmp_path / "p.npz")
+    assert (result.exit_code, result.stderr.strip()) == (130, "spem: interrupted")
+    assert [path.name for path in tmp_path.iterdir()] == ["bone.png"]
