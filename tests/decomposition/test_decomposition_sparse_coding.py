@@ -193,8 +193,8 @@ def test_codes_of_another_size(samples):
 
 
 @pytest.mark.data
-def test_parts_of_a_cat(data_dir: Path):
-    """Eight components of a cat's clipped log-fields explain nearly all, from any seed alike."""
+def test_parts_of_a_hand(data_dir: Path):
+    """Eight components of a hand's clipped log-fields explain nearly all, from any seed alike."""
     shape = spem.read(data_dir / "tari1000" / "obj11_3.png", inner_radius=20)
     log = solve_sources(point_sources(assemble(shape, "voxel")), np.inf).log
     X = np.maximum(log - log.mean(axis=0), 0).T

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from numbers import Integral
 from typing import Any, Self
 
 import numpy as np
@@ -224,8 +223,8 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     def _check_parameters(self, samples: Any) -> None:
         """Check the parameters against the samples."""
         n, p = samples.shape
-        k = self.n_components
-        if not (isinstance(k, Integral) and 1 <= k <= min(n, p)):
+        k: Any = self.n_components
+        if not (isinstance(k, int | np.integer) and 1 <= k <= min(n, p)):
             msg = f"n_components={k}: expected 1 to {min(n, p)}, no more than n_samples={n} or n_features={p}"
             raise ParameterError(msg)
         if not 0 <= self.sparsity < np.inf:
