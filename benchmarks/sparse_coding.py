@@ -40,7 +40,7 @@ INNER_RADIUS = 20.0
 COMPONENTS = 8
 SHARES = (0.02, 0.05, 0.1)
 COUNTS = range(1, 17)
-SEEDS = 10
+SEEDS = 5
 TIME_LIMIT, SPEED_LIMIT = 1.0, 5.0
 # Mini-batches of SPAMS that bring it near to where it goes; more of them gain little.
 SPAMS_ITERATIONS, SPAMS_BATCH = 1000, 512

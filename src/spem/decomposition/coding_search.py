@@ -10,7 +10,7 @@ import scipy.sparse
 from numpy.random import RandomState
 from numpy.typing import NDArray
 
-from spem.decomposition.coding_descent import Coding, descend, encode, residual_squares
+from spem.decomposition.coding_descent import Coding, descend, encode, objective, residual_squares
 
 Rule = Literal["farthest", "k-means++", "random"]
 RULES: tuple[Rule, ...] = ("farthest", "k-means++", "random")
@@ -18,6 +18,7 @@ RULES: tuple[Rule, ...] = ("farthest", "k-means++", "random")
 # Samples of the first level, at least, and for each component; the growth from level to level.
 _FIRST, _FIRST_EACH, _GROWTH = 1000, 32, 8
 _COARSE_TOL = 1e-4
+_ALIKE = 0.999  # cosine from which atoms count as the same
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,8 @@ class Search:
     """How starts are chosen and compared.
 
     Where some atoms are known, the second start ignores them. All starts descend on a small sample of the
-    data, in float32; the best goes on through larger samples to all data, in float64.
+    data, in float32; the one on whose atoms the next larger sample is coded best goes on, up to all data, in
+    float64.
 
     Parameters
     ----------
@@ -50,17 +52,17 @@ class Search:
         self, X: Any, n_atoms: int, known: NDArray[np.float64], sparsity: float, random: RandomState
     ) -> Coding:
         """Return the best coding found of the samples ``X``, starting from known atoms and chosen ones."""
-        order = random.permutation(X.shape[0])
-        first, *between = _levels(X.shape[0], n_atoms)
         unit = float(X.max()) or 1.0
-        coarse, weight = _sample(X, order[:first], unit), sparsity / unit
+        weight = sparsity / unit
+        first, *between = _levels(X.shape[0], n_atoms)
+        coarse = _sample(X, first, unit, random)
         starts = self._starts(coarse, n_atoms, known, random)
-        codings = [descend(coarse, atoms, weight, self.max_iter, _COARSE_TOL) for atoms in starts]
-        best = min(codings, key=lambda coding: float(coding.path[-1]))
+        found = _distinct([descend(coarse, atoms, weight, self.max_iter, _COARSE_TOL) for atoms in starts])
         for size in between:
-            coarse = _sample(X, order[:size], unit)
-            best = descend(coarse, best.atoms, weight, self.max_iter, _COARSE_TOL)
-        return descend(X, best.atoms, sparsity, self.max_iter, self.tol)
+            coarse = _sample(X, size, unit, random)
+            best = _best(coarse, found, weight)
+            found = [descend(coarse, best, weight, self.max_iter, _COARSE_TOL)]
+        return descend(X, _best(X, found, sparsity), sparsity, self.max_iter, self.tol)
 
     def _starts(
         self, X: Any, n_atoms: int, known: NDArray[np.float64], random: RandomState
@@ -124,9 +126,32 @@ def _levels(n_samples: int, n_atoms: int) -> list[int]:
     return sizes
 
 
-def _sample(X: Any, rows: NDArray[np.intp], unit: float) -> Any:
-    """Return these rows in multiples of the largest entry, which float32 can hold."""
-    return (X[np.sort(rows)] / unit).astype(np.float32)
+def _sample(X: Any, size: int, unit: float, random: RandomState) -> Any:
+    """Return samples, one of each stretch of the data, in multiples of a unit that float32 can hold."""
+    n = X.shape[0]
+    rows = np.unique(((np.arange(size) + random.uniform(size=size)) * (n / size)).astype(np.intp))
+    rows = np.arange(n) if size == n else np.minimum(rows, n - 1)
+    return (X[rows] / unit).astype(np.float32)
+
+
+def _distinct(codings: list[Coding]) -> list[Coding]:
+    """Return the codings without those that have the atoms of another one."""
+    kept: list[Coding] = []
+    for coding in codings:
+        alike = ((coding.atoms @ other.atoms.T).max(axis=1).min() for other in kept)
+        if max(alike, default=0.0) < _ALIKE:
+            kept.append(coding)
+    return kept
+
+
+def _best(X: Any, found: list[Coding], sparsity: float) -> NDArray[np.float64]:
+    """Return the atoms that these samples are best coded on; a small sample may prefer others."""
+    if len(found) == 1:
+        return found[0].atoms
+    return min(
+        (coding.atoms for coding in found),
+        key=lambda atoms: objective(X, atoms, encode(X, atoms, sparsity), sparsity),
+    )
 
 
 def _draw(weight: NDArray[np.float64], random: RandomState) -> int:

@@ -138,7 +138,7 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         init: Rule | ArrayLike = "farthest",
         n_init: int = 4,
         max_iter: int = 500,
-        tol: float = 1e-7,
+        tol: float = 1e-8,
         random_state: int | RandomState | None = None,
     ) -> None:
         self.n_components = n_components
