@@ -15,6 +15,10 @@ from spem.errors import ParameterError
 from spem.fields.source_fields import SourceFields
 
 
+# The curve is read to three digits.
+_TOL = 1e-4
+
+
 @dataclass(frozen=True, eq=False)
 class ErrorCurve:
     """What (4.3) leaves of a shape's measurements, against the number of parts.
@@ -54,11 +58,11 @@ def error_curve(
     over: Over = "region",
     sparsity: float = SPARSITY,
     centre: Centre = "mean",
-    n_init: int = 1,
+    n_init: int = 4,
     rng: np.random.Generator | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> ErrorCurve:
-    """Decompose with 1, 2, … components, each time from the ones before and a new one.
+    """Decompose with 1, 2, … components, each time starting from the ones before and a new one too.
 
     Parameters
     ----------
@@ -73,7 +77,7 @@ def error_curve(
     centre
         What the log-fields are measured from.
     n_init
-        Number of new components that are tried at each k; the best is kept.
+        Number of starts at each k, the first from the components before; the best is kept.
     rng
         Randomness of the new components; seed 0 by default.
     progress
@@ -109,8 +113,8 @@ def error_curve(
     errors: list[float] = []
     atoms = None
     for k in range(1, most + 1):
-        start = "k-means++" if atoms is None else atoms
-        coder = NonnegativeSparseCoding(k, weight, init=start, n_init=n_init, random_state=seed)
+        start = "farthest" if atoms is None else atoms
+        coder = NonnegativeSparseCoding(k, weight, init=start, n_init=n_init, tol=_TOL, random_state=seed)
         atoms = coder.fit(samples).components_
         errors.append(coder.objective_ / whole)
         if progress is not None:
