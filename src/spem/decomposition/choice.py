@@ -14,7 +14,6 @@ from spem.decomposition.sparse_coding import NonnegativeSparseCoding
 from spem.errors import ParameterError
 from spem.fields.source_fields import SourceFields
 
-
 # The curve is read to three digits.
 _TOL = 1e-4
 
