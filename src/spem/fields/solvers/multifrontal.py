@@ -12,6 +12,7 @@ from scipy.linalg.lapack import dpotrf
 
 from spem.errors import ParameterError, SizeError
 from spem.fields.operator import System
+from spem.fields.solvers.blas import threads_for
 from spem.fields.solvers.dissection import Dissection, dissect
 from spem.shapes.limits import memory_limit_bytes
 
@@ -49,13 +50,14 @@ class Factor:
         """Solve for right-hand sides ``(n_nodes,)`` or ``(n_nodes, k)``; the result has their shape."""
         d = self.dissection
         x = np.array(rhs.reshape(d.order.size, -1)[d.order], np.float64, order="C")
-        reached = self._forward(x)
-        self._backward(x, reached)
+        with threads_for(d.n_entries):
+            self._forward(x)
+            self._backward(x)
         solution = np.empty_like(x)
         solution[d.order] = x
         return solution.reshape(rhs.shape)
 
-    def _forward(self, x: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _forward(self, x: NDArray[np.float64]) -> None:
         """Overwrite x with L⁻¹ x, skipping the fronts below which every right-hand side is zero."""
         d = self.dissection
         used = np.add.reduceat(np.any(x != 0, axis=1), d.start[:-1]) > 0
@@ -68,9 +70,8 @@ class Factor:
                 used[d.parent[f]] = True
                 rows = d.rows[d.row_start[f] : d.row_start[f + 1]]
                 x[rows] -= self.below[f] @ own
-        return used
 
-    def _backward(self, x: NDArray[np.float64], used: NDArray[np.bool_]) -> None:
+    def _backward(self, x: NDArray[np.float64]) -> None:
         """Overwrite x with L⁻ᵀ x."""
         d = self.dissection
         for f in reversed(range(d.n_fronts)):
@@ -116,25 +117,28 @@ def factorize(system: System, shift: float, *, memory_limit: int | None = None) 
     if not np.isfinite(values).all():
         msg = f"{system.shape.name}: 1/rho² = {shift:g} is beyond what numbers hold; use a larger rho"
         raise ParameterError(msg)
+    with threads_for(d.n_entries):
+        return Factor(d, *_eliminate(system, values, d))
+
+
+def _eliminate(
+    system: System, values: NDArray[np.float64], d: Dissection
+) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Eliminate front after front; each hands its update to its parent."""
     diagonal: list[NDArray[np.float64]] = []
     below: list[NDArray[np.float64]] = []
     waiting: dict[int, list[_Update]] = {}
     for f in range(d.n_fronts):
         rows = d.rows[d.row_start[f] : d.row_start[f + 1]]
         own, coupling, update = _front(system, values, d, f, waiting.pop(f, []))
-        own, failed = dpotrf(own, lower=1, clean=0, overwrite_a=1)
-        if failed:
-            msg = (
-                f"{system.shape.name}: a system with 1/rho² = {shift:g} cannot be factored; use a larger rho"
-            )
-            raise ParameterError(msg)
+        own, _ = dpotrf(own, lower=1, clean=0, overwrite_a=1)  # no pivot of an M-matrix fails
         if rows.size:
             coupling = dtrsm(1.0, own, coupling, side=1, lower=1, trans_a=1, overwrite_b=1)
             update = dsyrk(-1.0, coupling, beta=1.0, c=update, lower=1, overwrite_c=1)
             waiting.setdefault(int(d.parent[f]), []).append((rows, update))
         diagonal.append(own)
         below.append(coupling)
-    return Factor(d, diagonal, below)
+    return diagonal, below
 
 
 def _check_memory(system: System, d: Dissection, memory_limit: int | None) -> None:
