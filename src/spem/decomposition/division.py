@@ -109,10 +109,10 @@ def parts_of_factors(
     components: NDArray[np.float64],
     basis: NDArray[np.float64],
 ) -> Parts:
-    """Label nodes and sources by the factors of a decomposition, and number the parts by size.
+    """Label nodes and sources by the factors of a decomposition.
 
-    A node or a source belongs to the component that brings most to its measurement, of those that explain at
-    least a tenth of it together.
+    Part j is component j. A node or a source belongs to the component that brings most to its measurement,
+    or to none where all together explain less than a tenth of its square.
 
     Parameters
     ----------
@@ -139,8 +139,7 @@ def parts_of_factors(
     node_labels, source_labels = labels if over == "region" else labels[::-1]
     total = components.sum(axis=1)
     intensity = total / max(float(total.sum()), np.finfo(float).tiny)
-    parts = Parts(fields.sources, fields.rho, over, components, basis, node_labels, source_labels, intensity)
-    return parts.relabelled(_by_size(parts))
+    return Parts(fields.sources, fields.rho, over, components, basis, node_labels, source_labels, intensity)
 
 
 def _divide(
@@ -163,7 +162,8 @@ def _divide(
         random_state=int((rng or np.random.default_rng(0)).integers(2**31)),
     )
     codes = coder.fit_transform(samples)
-    return parts_of_factors(fields, over, measured, np.ascontiguousarray(codes.T), coder.components_)
+    parts = parts_of_factors(fields, over, measured, np.ascontiguousarray(codes.T), coder.components_)
+    return parts.relabelled(_by_size(parts))
 
 
 def check_division(fields: SourceFields, n_parts: int, sparsity: float) -> None:
@@ -206,9 +206,12 @@ def _explained(
     samples: NDArray[np.float64], components: NDArray[np.float64], basis: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Share of the square of each column (sample) and row (feature) of the samples that A S explains."""
-    residual = np.square(samples - basis.T @ components)
-    square = np.square(samples)
-    shares = [1 - residual.sum(axis) / np.maximum(square.sum(axis), np.finfo(float).tiny) for axis in (0, 1)]
+    residual = basis.T @ components
+    residual -= samples
+    shares = []
+    for lines in ("ij,ij->j", "ij,ij->i"):
+        square = np.maximum(np.einsum(lines, samples, samples), np.finfo(float).tiny)
+        shares.append(1 - np.einsum(lines, residual, residual) / square)
     return shares[0], shares[1]
 
 
