@@ -57,7 +57,7 @@ def error_curve(
     over: Over = "region",
     sparsity: float = SPARSITY,
     centre: Centre = "mean",
-    n_init: int = 4,
+    n_init: int = 2,
     rng: np.random.Generator | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> ErrorCurve:

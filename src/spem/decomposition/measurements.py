@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -66,7 +67,10 @@ def centred_logs(
 def measurements(
     fields: SourceFields, centre: Centre = "mean", *, over: Over = "region"
 ) -> NDArray[np.float64]:
-    """Return the non-negative measurements Y of (4.3): `centred_logs` with zeros where they are negative.
+    """Return the non-negative measurements Y of (4.3): centred log-fields with zeros where they are negative.
+
+    A source that does not reach a node counts there as the weakest that reaches any, so that components of a
+    shape that lie apart fall into different parts.
 
     Parameters
     ----------
@@ -82,7 +86,16 @@ def measurements(
     -------
     Y
         ``(n_sources, n_nodes)``, finite, at least 0; 0 where a source does not reach a node.
+
+    Raises
+    ------
+    ParameterError
+        When `centre` or `over` is another word.
     """
+    unreached = np.isneginf(fields.log)
+    if unreached.any():
+        weakest = fields.log.min(where=~unreached, initial=0.0)
+        fields = replace(fields, log=np.where(unreached, weakest, fields.log))
     centred = centred_logs(fields, centre, over=over)
     return np.maximum(centred, 0.0, out=centred)
 

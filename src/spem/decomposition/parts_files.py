@@ -92,7 +92,8 @@ def load_parts(path: str | os.PathLike[str]) -> Parts:
         msg = f"{source}: no such file; expected parts that spem wrote"
         raise ReadError(msg)
     try:
-        with np.load(source, allow_pickle=False) as file:
+        # opened here, for NumPy leaves a damaged file open
+        with source.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         about = json.loads(str(arrays["about"]))
         version = about["format"]
