@@ -14,8 +14,13 @@ if TYPE_CHECKING:
     from spem.codes.vlad import VLAD
     from spem.codes.vocabulary import Vocabulary
     from spem.collections import encode, evaluate, search
+    from spem.decomposition.choice import ErrorCurve, error_curve
+    from spem.decomposition.clusters import Clusters, cluster_interactions
+    from spem.decomposition.interactions import node_correlation, source_correlation, source_node_correlation
+    from spem.decomposition.joint import JointParts, joint_parts
     from spem.decomposition.parts import Parts
     from spem.decomposition.sparse_coding import NonnegativeSparseCoding
+    from spem.decomposition.transfer import vertex_labels
     from spem.embedding.maps import Maps
     from spem.errors import (
         ConvergenceError,
@@ -27,14 +32,18 @@ if TYPE_CHECKING:
         SizeError,
         SpemError,
     )
+    from spem.fields.gradients import source_gradient
     from spem.fields.hyperfield import Hyperfield
+    from spem.fields.isocontours import iso_contours, iso_surfaces
     from spem.fields.solvers.cg import ConjugateGradient
     from spem.fields.solvers.direct import Direct
     from spem.fields.solvers.explicit import ExplicitIteration
     from spem.fields.solvers.protocol import Solution
     from spem.fields.solvers.sweep import Sweep
     from spem.fields.source_fields import SourceFields
+    from spem.fields.source_hyperfield import SourceHyperfield
     from spem.fields.sources import Sources
+    from spem.fields.streamlines import Streamlines, source_streamlines
     from spem.retrieval.distances import correlation_distance, fuse
     from spem.retrieval.evaluation import PrecisionRecall, Scores, bulls_eye, precision_recall
     from spem.retrieval.ranking import Answer
@@ -47,14 +56,17 @@ __version__ = "0.1.0"
 
 __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three lists
     "Answer",
+    "Clusters",
     "Codes",
     "ConjugateGradient",
     "ConvergenceError",
     "Cuts",
     "Direct",
+    "ErrorCurve",
     "ExplicitIteration",
     "Failure",
     "Hyperfield",
+    "JointParts",
     "LabelError",
     "Maps",
     "Model",
@@ -72,42 +84,58 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "SizeError",
     "Solution",
     "SourceFields",
+    "SourceHyperfield",
     "Sources",
     "SpemError",
+    "Streamlines",
     "Sweep",
     "VLAD",
     "Vocabulary",
     "bulls_eye",
+    "cluster_interactions",
     "correlation_distance",
     "creatures",
     "encode",
+    "error_curve",
     "evaluate",
     "field",
     "fuse",
+    "iso_contours",
+    "iso_surfaces",
+    "joint_parts",
     "maps",
+    "node_correlation",
     "parts",
     "precision_recall",
     "read",
     "read_all",
     "search",
     "signed_distance_shape",
+    "source_correlation",
     "source_fields",
+    "source_gradient",
+    "source_node_correlation",
+    "source_streamlines",
     "sources",
     "sweep",
     "synthetic",
+    "vertex_labels",
 ]
 
 # Public name -> module that defines it; each is imported when it is first used.
 _HOME = {
     "Answer": "spem.retrieval.ranking",
+    "Clusters": "spem.decomposition.clusters",
     "Codes": "spem.codes.codes",
     "ConjugateGradient": "spem.fields.solvers.cg",
     "ConvergenceError": "spem.errors",
     "Cuts": "spem.shapes.shape",
     "Direct": "spem.fields.solvers.direct",
+    "ErrorCurve": "spem.decomposition.choice",
     "ExplicitIteration": "spem.fields.solvers.explicit",
     "Failure": "spem.codes.codes",
     "Hyperfield": "spem.fields.hyperfield",
+    "JointParts": "spem.decomposition.joint",
     "LabelError": "spem.errors",
     "Maps": "spem.embedding.maps",
     "Model": "spem.codes.model",
@@ -125,29 +153,42 @@ _HOME = {
     "SizeError": "spem.errors",
     "Solution": "spem.fields.solvers.protocol",
     "SourceFields": "spem.fields.source_fields",
+    "SourceHyperfield": "spem.fields.source_hyperfield",
     "Sources": "spem.fields.sources",
     "SpemError": "spem.errors",
+    "Streamlines": "spem.fields.streamlines",
     "Sweep": "spem.fields.solvers.sweep",
     "VLAD": "spem.codes.vlad",
     "Vocabulary": "spem.codes.vocabulary",
     "bulls_eye": "spem.retrieval.evaluation",
+    "cluster_interactions": "spem.decomposition.clusters",
     "correlation_distance": "spem.retrieval.distances",
     "creatures": "spem.shapes.creatures",
     "encode": "spem.collections",
+    "error_curve": "spem.decomposition.choice",
     "evaluate": "spem.collections",
     "field": "spem.api.fields",
     "fuse": "spem.retrieval.distances",
+    "iso_contours": "spem.fields.isocontours",
+    "iso_surfaces": "spem.fields.isocontours",
+    "joint_parts": "spem.decomposition.joint",
     "maps": "spem.api.fields",
+    "node_correlation": "spem.decomposition.interactions",
     "parts": "spem.api.parts",
     "precision_recall": "spem.retrieval.evaluation",
     "read": "spem.shapes.read",
     "read_all": "spem.shapes.read",
     "search": "spem.collections",
     "signed_distance_shape": "spem.shapes.levels",
+    "source_correlation": "spem.decomposition.interactions",
     "source_fields": "spem.api.parts",
+    "source_gradient": "spem.fields.gradients",
+    "source_node_correlation": "spem.decomposition.interactions",
+    "source_streamlines": "spem.fields.streamlines",
     "sources": "spem.api.parts",
     "sweep": "spem.api.fields",
     "synthetic": "spem.shapes.synthetic",
+    "vertex_labels": "spem.decomposition.transfer",
 }
 
 # Type checkers read the imports above, and would take any name for one of this function's.

@@ -107,7 +107,9 @@ def test_given_meshes_are_shown(tmp_path):
     shape = read((box.vertices, box.faces), spacing=0.5)
     part = SimpleNamespace(shape=shape, node_labels=np.zeros(shape.n_nodes, int))
     _, data = written(tmp_path, [part], meshes=[(box.vertices, box.faces)])
-    assert array(data["shapes"][0]["places"], "<u2", 4).shape == (8, 4)
+    shown = part_surface(shape, part.node_labels, mesh=(box.vertices, box.faces))
+    assert np.allclose(np.ptp(shown.vertices, axis=0), (4, 2, 2))
+    assert array(data["shapes"][0]["places"], "<u2", 4).shape == (len(shown.vertices), 4)
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import overload
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from spem.decomposition.division import SPARSITY, boundary_parts, region_parts
+from spem.decomposition.joint import joint_parts
 from spem.decomposition.measurements import Over
 from spem.decomposition.parts import Parts
+from spem.errors import ParameterError
 from spem.fields.operator import Boundary, assemble
 from spem.fields.patches import patch_sources
 from spem.fields.rho import check_rho
@@ -17,6 +22,7 @@ from spem.shapes.shape import Shape
 
 # Patches of a solid's boundary: a field for each of its points would not fit (5.1).
 _PATCHES = 200
+_DIVIDE = {"region": region_parts, "boundary": boundary_parts}
 
 
 def sources(
@@ -85,8 +91,36 @@ def source_fields(sources: Sources, rho: float = np.inf) -> SourceFields:
     return solve_sources(sources, float(check_rho(rho)[0]))
 
 
+@overload
 def parts(
-    shape: Shape,
+    shapes: Shape,
+    n_parts: int = ...,
+    *,
+    over: Over = ...,
+    rho: float = ...,
+    sparsity: float = ...,
+    n_patches: int | None = ...,
+    boundary: Boundary = ...,
+    rng: np.random.Generator | None = ...,
+) -> Parts: ...
+
+
+@overload
+def parts(
+    shapes: Sequence[Shape],
+    n_parts: int = ...,
+    *,
+    over: Over = ...,
+    rho: float = ...,
+    sparsity: float = ...,
+    n_patches: int | None = ...,
+    boundary: Boundary = ...,
+    rng: np.random.Generator | None = ...,
+) -> list[Parts]: ...
+
+
+def parts(
+    shapes: Shape | Sequence[Shape],
     n_parts: int = 8,
     *,
     over: Over = "region",
@@ -95,13 +129,14 @@ def parts(
     n_patches: int | None = None,
     boundary: Boundary = "voxel",
     rng: np.random.Generator | None = None,
-) -> Parts:
+) -> Parts | list[Parts]:
     """Divide a shape into parts by non-negative sparse coding of its sources' fields (4.1, 4.3, 5.2).
 
     Parameters
     ----------
-    shape
-        Any shape.
+    shapes
+        A shape; or several, poses of one body or like ones, divided together: one label is the same part in
+        all of them.
     n_parts
         Number k of components.
     over
@@ -130,10 +165,25 @@ def parts(
     >>> import numpy as np, spem
     >>> bone = np.pad(np.ones((3, 20)), ((4, 4), (0, 0)))
     >>> bone[:, :8] = bone[:, -8:] = 1
-    >>> spem.parts(spem.Shape.from_mask(bone, name="bone"), 2)
+    >>> bone = spem.Shape.from_mask(bone, name="bone")
+    >>> spem.parts(bone, 2)
     Parts('bone', 2 parts of its region, rho inf, sizes 50, 50 %)
+    >>> [p.sizes.round(2).tolist() for p in spem.parts([bone, bone], 2)]
+    [[0.5, 0.5], [0.5, 0.5]]
     """
-    divide = region_parts if over == "region" else boundary_parts
-    count = _PATCHES if n_patches is None and shape.ndim > 2 else n_patches
-    fields = source_fields(sources(shape, count, boundary=boundary, rng=rng), rho)
-    return divide(fields, n_parts, sparsity=sparsity, rng=rng)
+    if over not in _DIVIDE:
+        msg = f"over={over!r}: expected one of {', '.join(map(repr, _DIVIDE))}"
+        raise ParameterError(msg)
+    several = [shapes] if isinstance(shapes, Shape) else list(shapes)
+    fields = [
+        source_fields(sources(shape, _patches(shape, n_patches), boundary=boundary, rng=rng), rho)
+        for shape in several
+    ]
+    if not isinstance(shapes, Shape):
+        return list(joint_parts(fields, n_parts, over=over, sparsity=sparsity, rng=rng).parts)
+    return _DIVIDE[over](fields[0], n_parts, sparsity=sparsity, rng=rng)
+
+
+def _patches(shape: Shape, n_patches: int | None) -> int | None:
+    """Return the number of patches asked for, or the default of the shape's dimension."""
+    return _PATCHES if n_patches is None and shape.ndim > 2 else n_patches

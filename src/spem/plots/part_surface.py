@@ -10,6 +10,7 @@ import numpy as np
 from spem.decomposition.transfer import sample_points
 from spem.plots.borders import Borders
 from spem.plots.raster import vertex_normals
+from spem.plots.refinement import refine
 from spem.plots.surfaces import shape_surface
 
 if TYPE_CHECKING:
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     from spem.shapes.shape import Shape
 
     Mesh: TypeAlias = tuple[ArrayLike, ArrayLike]
+
+# Edges of a mesh, in voxels, beyond which labels at its vertices alone would miss how a border runs.
+_LONGEST = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +71,7 @@ class PartSurface:
 def part_surface(shape: Shape, node_labels: ArrayLike, *, mesh: Mesh | None = None) -> PartSurface:
     """Divide the surface of a shape by the labels of the nodes below it.
 
-    Triangles that a border crosses are cut along it.
+    Triangles that a border crosses are cut along it; large ones are divided first.
 
     Parameters
     ----------
@@ -103,7 +107,9 @@ def part_surface(shape: Shape, node_labels: ArrayLike, *, mesh: Mesh | None = No
         merged, _, samples = sample_points(shape, *mesh)
         vertices, faces = merged.vertices, merged.faces
         index = _grid_index(shape, samples)
-    normals = vertex_normals(vertices, faces)
+    rows = np.hstack([vertices, vertex_normals(vertices, faces), index])
+    rows, faces = refine(rows, faces, _LONGEST * max(shape.spacing))
+    vertices, normals, index = np.split(rows, 3, axis=1)
     return divide(vertices, faces, normals, borders.weigh(index), borders.values)
 
 
