@@ -20,7 +20,7 @@ from spem.fields.source_fields import SourceFields, solve_sources
 from spem.fields.sources import Sources, point_sources
 from spem.shapes.shape import Shape
 
-# Patches of a solid's boundary: a field for each of its points would not fit (5.1).
+# Enough to tell fingers apart; more, up to every boundary point, make parts no steadier.
 _PATCHES = 200
 _DIVIDE = {"region": region_parts, "boundary": boundary_parts}
 
@@ -126,7 +126,7 @@ def parts(
     over: Over = "region",
     rho: float = np.inf,
     sparsity: float = SPARSITY,
-    n_patches: int | None = None,
+    n_patches: int | None = _PATCHES,
     boundary: Boundary = "voxel",
     rng: np.random.Generator | None = None,
 ) -> Parts | list[Parts]:
@@ -146,8 +146,8 @@ def parts(
     sparsity
         λ of (4.3), as a share of the λ at which all codes vanish.
     n_patches
-        Patches of the boundary, one source each; by default every boundary point of a silhouette, and 200
-        patches of a solid.
+        Patches of the boundary, one source each: as many, or every boundary point where there are no more.
+        None: every boundary point, as the paper has it for silhouettes.
     boundary
         Boundary model; by default the paper's, where a source is an outside voxel.
     rng
@@ -176,14 +176,28 @@ def parts(
         raise ParameterError(msg)
     several = [shapes] if isinstance(shapes, Shape) else list(shapes)
     fields = [
-        source_fields(sources(shape, _patches(shape, n_patches), boundary=boundary, rng=rng), rho)
-        for shape in several
+        source_fields(part_sources(shape, n_patches, boundary=boundary, rng=rng), rho) for shape in several
     ]
     if not isinstance(shapes, Shape):
         return list(joint_parts(fields, n_parts, over=over, sparsity=sparsity, rng=rng).parts)
     return _DIVIDE[over](fields[0], n_parts, sparsity=sparsity, rng=rng)
 
 
-def _patches(shape: Shape, n_patches: int | None) -> int | None:
-    """Return the number of patches asked for, or the default of the shape's dimension."""
-    return _PATCHES if n_patches is None and shape.ndim > 2 else n_patches
+def part_sources(
+    shape: Shape,
+    n_patches: int | None = _PATCHES,
+    *,
+    boundary: Boundary = "voxel",
+    rng: np.random.Generator | None = None,
+) -> Sources:
+    """Sources that a shape is divided by: patches, or every boundary point where there are no more.
+
+    Parameters
+    ----------
+    shape, n_patches, boundary, rng
+        As for `parts`.
+    """
+    points = sources(shape, boundary=boundary)
+    if n_patches is None or n_patches >= points.n_sources:
+        return points
+    return sources(shape, n_patches, boundary=boundary, rng=rng)
