@@ -190,7 +190,7 @@ def part_sources(
     boundary: Boundary = "voxel",
     rng: np.random.Generator | None = None,
 ) -> Sources:
-    """Sources that a shape is divided by: patches, or every boundary point where there are no more.
+    """Return the sources that a shape is divided by: patches, or every point where there are no more.
 
     Parameters
     ----------
