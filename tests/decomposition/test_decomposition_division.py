@@ -142,6 +142,14 @@ def test_scale_of_a_component_is_in_its_codes():
     np.testing.assert_allclose(np.linalg.norm(scaled.basis, axis=1), 1)
 
 
+@pytest.mark.parametrize("rho", [0.02, np.inf])
+def test_node_belongs_to_the_boundary_in_which_its_walk_ends(rho):
+    """On an interval each half belongs to its own end, even where the fields vanish at tiny rho."""
+    parts = boundary_parts(_fields(np.ones(40), rho=rho), 2)
+    assert parts.source_labels.tolist() == [0, 1]
+    np.testing.assert_array_equal(parts.node_labels, np.repeat([0, 1], 20))
+
+
 def test_bad_numbers_are_refused():
     """Too many parts, and a sparsity at which nothing is left, are named with what is possible."""
     fields = _fields(np.ones((2, 3)))

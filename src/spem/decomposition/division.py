@@ -6,13 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.decomposition.measurements import Centre, Over, measurements
-from spem.decomposition.parts import Parts, contributions, strongest_part
+from spem.decomposition.parts import Parts, strongest_part, touched_part
 from spem.decomposition.sparse_coding import NonnegativeSparseCoding, largest_sparsity
 from spem.errors import ParameterError
 from spem.fields.source_fields import SourceFields
 
-# A node or source belongs to no part where the components together explain less than this share of the square
-# of its measurement.
+# A sample belongs to no part where the components together explain less than this share of its square.
 MIN_EXPLAINED = 0.1
 SPARSITY = 0.1
 
@@ -77,7 +76,8 @@ def boundary_parts(
     """Divide the boundary of a shape into parts, with the region that each owns (5.2).
 
     The paper takes the transpose of Y "without normalization (4.2)", which does not say what non-negative
-    measurement is meant. Here the log-field of each source is measured from its own mean over the nodes.
+    measurement is meant. Here the log-field of each source is measured from its own mean over the nodes. A
+    part owns the nodes from which a random walk most likely ends in it.
 
     Parameters
     ----------
@@ -111,8 +111,10 @@ def parts_of_factors(
 ) -> Parts:
     """Label nodes and sources by the factors of a decomposition.
 
-    Part j is component j. A node or a source belongs to the component that brings most to its measurement,
-    or to none where all together explain less than a tenth of its square.
+    Part j is component j. What is divided, a node for the region, a source for the boundary, belongs to the
+    component that brings most to its measurement, or to none where all together explain less than a tenth of
+    its square. A source then belongs to the part of the region that it is next to, and a node to the part of
+    the boundary in which a random walk from it most likely ends, that of the largest sum of fields.
 
     Parameters
     ----------
@@ -127,16 +129,14 @@ def parts_of_factors(
     basis
         ``(k, n_sources)`` columns of A for the region, ``(k, n_nodes)`` for the boundary.
     """
-    samples = measured if over == "region" else measured.T
     norm = np.linalg.norm(basis, axis=1)[:, None]
     components, basis = components * norm, basis / np.where(norm > 0, norm, 1.0)
-    brought = contributions(components, basis)
-    explained = _explained(samples, components, basis)
-    labels = [
-        np.where(share >= MIN_EXPLAINED, strongest_part(part), -1).astype(np.int32)
-        for part, share in zip(brought, explained, strict=True)
-    ]
-    node_labels, source_labels = labels if over == "region" else labels[::-1]
+    explained = _explained(measured if over == "region" else measured.T, components, basis)
+    labels = np.where(explained < MIN_EXPLAINED, -1, strongest_part(components)).astype(np.int32)
+    if over == "region":
+        node_labels, source_labels = labels, touched_part(fields.sources, labels, len(components))
+    else:
+        node_labels, source_labels = _owner(fields, labels, len(components)), labels
     total = components.sum(axis=1)
     intensity = total / max(float(total.sum()), np.finfo(float).tiny)
     return Parts(fields.sources, fields.rho, over, components, basis, node_labels, source_labels, intensity)
@@ -204,15 +204,22 @@ def limit_of(samples: NDArray[np.float64], fields: SourceFields) -> float:
 
 def _explained(
     samples: NDArray[np.float64], components: NDArray[np.float64], basis: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Share of the square of each column (sample) and row (feature) of the samples that A S explains."""
+) -> NDArray[np.float64]:
+    """Share of the square of each column that A S explains."""
     residual = basis.T @ components
     residual -= samples
-    shares = []
-    for lines in ("ij,ij->j", "ij,ij->i"):
-        square = np.maximum(np.einsum(lines, samples, samples), np.finfo(float).tiny)
-        shares.append(1 - np.einsum(lines, residual, residual) / square)
-    return shares[0], shares[1]
+    square = np.einsum("ij,ij->j", samples, samples)
+    left = np.einsum("ij,ij->j", residual, residual)
+    return np.asarray(1 - left / np.maximum(square, np.finfo(float).tiny))
+
+
+def _owner(fields: SourceFields, source_labels: NDArray[np.int32], n_parts: int) -> NDArray[np.int32]:
+    """Part of the boundary in which a walk from each node most likely ends."""
+    share = np.exp(fields.log - np.maximum(fields.log.max(axis=0), np.finfo(float).min))
+    ends = np.zeros((n_parts, fields.sources.n_sources))
+    labelled = np.flatnonzero(source_labels >= 0)
+    ends[source_labels[labelled], labelled] = 1.0
+    return strongest_part(ends @ share)
 
 
 def _by_size(parts: Parts) -> NDArray[np.int64]:

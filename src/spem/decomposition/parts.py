@@ -128,22 +128,17 @@ class Parts:
             strongest = self.intensity.max() * self.n_parts
             msg = f"threshold={threshold:g}: every part is weaker; expected at most {strongest:.3g}"
             raise ParameterError(msg)
-        samples, features = contributions(self.components, self.basis)
-        samples[weak] = features[weak] = 0.0
-        return self._filled(strongest_part(samples), strongest_part(features), weak)
-
-    def _filled(
-        self, samples: NDArray[np.int32], features: NDArray[np.int32], gone: NDArray[np.bool_]
-    ) -> Parts:
-        """Give what the parts that are gone held to other ones, and leave them out."""
-        nodes, sources = (samples, features) if self.over == "region" else (features, samples)
-        gone_or_none = np.append(gone, False)  # the last entry serves label -1
-        filled = replace(
-            self,
-            node_labels=np.where(gone_or_none[self.node_labels], nodes, self.node_labels),
-            source_labels=np.where(gone_or_none[self.source_labels], sources, self.source_labels),
-        )
-        return filled.relabelled(np.flatnonzero(~gone))
+        samples = strongest_part(np.where(weak[:, None], 0.0, self.components))
+        if self.over == "region":
+            nodes = _given_away(self.node_labels, weak, samples)
+            beside = touched_part(self.sources, nodes, self.n_parts)
+            sources = _given_away(self.source_labels, weak, beside)
+        else:
+            sources = _given_away(self.source_labels, weak, samples)
+            strength = np.where(weak, 0.0, np.linalg.norm(self.components, axis=1))
+            nodes = _given_away(self.node_labels, weak, strongest_part(self.basis * strength[:, None]))
+        filled = replace(self, node_labels=nodes, source_labels=sources)
+        return filled.relabelled(np.flatnonzero(~weak))
 
     def to_xarray(self) -> xarray.Dataset:
         """Label the arrays: dims ``part``, ``node`` and ``source``, coordinates of nodes and sources."""
@@ -183,28 +178,34 @@ class Parts:
         return f"Parts({self.shape.name!r}, {what}, sizes {sizes} %{lost})"
 
 
-def contributions(
-    components: NDArray[np.float64], basis: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return how much each component brings to each sample and to each feature.
-
-    Parameters
-    ----------
-    components
-        ``(k, n_samples)`` rows of S.
-    basis
-        ``(k, n_features)`` columns of A.
-
-    Returns
-    -------
-    tuple
-        ``(k, n_samples)`` and ``(k, n_features)``: norms of the columns and of the rows of each Aⱼ Sⱼ.
-    """
-    norms = np.linalg.norm(basis, axis=1, keepdims=True), np.linalg.norm(components, axis=1, keepdims=True)
-    return components * norms[0], basis * norms[1]
-
-
 def strongest_part(contribution: NDArray[np.float64]) -> NDArray[np.int32]:
     """Return the component of most contribution to each column of ``(k, n)``, -1 where none has any."""
     strongest = contribution.argmax(axis=0)
     return np.where(contribution.max(axis=0) > 0, strongest, -1).astype(np.int32)
+
+
+def touched_part(sources: Sources, node_labels: NDArray[np.int32], n_parts: int) -> NDArray[np.int32]:
+    """Return the part that most of each source's boundary edges lead to, -1 where it touches none.
+
+    Parameters
+    ----------
+    sources
+        The sources.
+    node_labels
+        ``(n_nodes,)`` part of each node, or -1.
+    n_parts
+        Number of parts.
+    """
+    touched = np.zeros((n_parts, sources.n_sources))
+    edges = sources.rhs.tocoo()
+    label = node_labels[edges.row]
+    inside = label >= 0
+    np.add.at(touched, (label[inside], edges.col[inside]), edges.data[inside])
+    return strongest_part(touched)
+
+
+def _given_away(
+    labels: NDArray[np.int32], gone: NDArray[np.bool_], others: NDArray[np.int32]
+) -> NDArray[np.int32]:
+    """Labels, with other ones where the part is gone."""
+    return np.where(np.append(gone, False)[labels], others, labels)  # the last entry serves label -1
