@@ -418,6 +418,8 @@ def test_demo(spem: Spem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr("spem.cli.demo.KINDS", ("fish", "starfish"))
     result = spem("demo", tmp_path / "d")
     assert result.exit_code == 0, result.output
-    for name in ("images.spem", "meshes.spem", "images-maps.png", "meshes-fields.png", "meshes-report.html"):
+    for name in ("images.spem", "meshes.spem", "images-maps.png", "meshes-fields.png"):
         assert (tmp_path / "d" / name).stat().st_size > 1000
-    assert "meshes-report.html" in result.stdout
+    for name in ("images-parts.png", "meshes-parts.png", "meshes-parts.html", "meshes-report.html"):
+        assert name in result.stdout
+        assert (tmp_path / "d" / name).stat().st_size > 1000

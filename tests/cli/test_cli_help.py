@@ -72,6 +72,7 @@ def test_defaults_of_parts_are_those_of_the_library(spem: Callable[..., Result])
     default = {name: option.default for name, option in signature(package.parts).parameters.items()}
     assert f"[default: {default['sparsity']}]" in text.split("--sparsity ")[1][:140]
     assert f"[{default['n_parts']}; 16]" in text.split("--n-parts ")[1][:140]
+    assert f"[default: {default['n_patches']}]" in text.split("--patches ")[1][:140]
     assert f"[default: {default['boundary']}]" in text.split("--boundary ")[1][:140]
 
 

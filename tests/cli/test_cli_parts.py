@@ -92,6 +92,14 @@ def test_parts_are_those_of_the_library(spem: Spem, bone: Path, tmp_path: Path) 
         np.testing.assert_array_equal(found.node_labels, expected.node_labels)
 
 
+def test_sources_are_patches_or_every_node(spem: Spem, tmp_path: Path) -> None:
+    """Without --patches there are 200 sources where the boundary has as many nodes; `all` takes every node."""
+    np.save(tmp_path / "square.npy", np.pad(np.ones((60, 60), bool), 1))
+    for options, count in (((), 200), (("--patches", "all"), 240)):
+        run = spem("parts", tmp_path / "square.npy", "-k", "2", *options, "-o", tmp_path / "p.npz", "--json")
+        assert json.loads(run.stdout)["n_sources"] == count
+
+
 def test_number_of_parts_by_the_curve(spem: Spem, bone: Path, tmp_path: Path) -> None:
     """--curve prints and draws the error against k; -k auto takes the k that it suggests."""
     plot = tmp_path / "curve.png"
@@ -145,6 +153,89 @@ def test_components_apart_have_parts_apart(spem: Spem, tmp_path: Path) -> None:
     assert sides in ([{0}, {1}], [{1}, {0}])
 
 
+@pytest.fixture
+def clubs(tmp_path: Path) -> list[Path]:
+    """Return three clubs: a large end, a handle of some length, a small end; one of them turned round."""
+    paths = []
+    for i, length in enumerate((10, 12, 14)):
+        mask = np.zeros((16, 24 + length), bool)
+        mask[2:14, 2:14] = mask[7:9, 14 : 14 + length] = mask[5:11, 14 + length : 20 + length] = True
+        paths.append(tmp_path / f"club{i}.npy")
+        np.save(paths[-1], mask[:, ::-1] if i == 1 else mask)
+    return paths
+
+
+def test_several_shapes_have_the_same_parts(spem: Spem, clubs: list[Path], tmp_path: Path) -> None:
+    """A label is the same part in all shapes: a file each in a folder, one picture for all."""
+    folder, plot = tmp_path / "parts", tmp_path / "p.png"
+    result = spem("parts", *clubs, "-k", "2", "--patches", "40", "-o", folder, "--plot", plot)
+    assert result.exit_code == 0, result.stderr
+    assert sorted(path.name for path in folder.iterdir()) == ["club0.npz", "club1.npz", "club2.npz"]
+    assert f"wrote {folder / 'club2.npz'}" in result.stdout
+    assert plot.read_bytes()[:4] == b"\x89PNG"
+    large = []
+    for path in clubs:
+        parts = package.Parts.load(folder / f"{path.stem}.npz")
+        mask = np.load(path)
+        column = 8 if path.stem != "club1" else mask.shape[1] - 9
+        large.append(int(parts.node_labels[np.argmin(abs(parts.shape.points - [8, column]).sum(axis=1))]))
+    assert len(set(large)) == 1
+
+
+def test_several_solids_have_meshes_of_their_own(spem: Spem, solid: Path, tmp_path: Path) -> None:
+    """Meshes of several shapes go to a folder, one page shows all; a second run replaces them."""
+    copy, folder, page = tmp_path / "copy.obj", tmp_path / "meshes", tmp_path / "p.htm"
+    copy.write_bytes(solid.read_bytes())
+    options = ("-k", "2", "--patches", "20", "--voxels", "300", "--components", "all")
+    for _ in range(2):
+        result = spem("parts", solid, copy, *options, "--mesh", folder, "--page", page, "--json")
+        assert result.exit_code == 0, result.stderr
+    assert sorted(path.name for path in folder.iterdir()) == ["bone.ply", "copy.ply"]
+    summary = json.loads(result.stdout)
+    assert [shape["name"] for shape in summary["shapes"]] == ["bone", "copy"]
+    assert (summary["mesh"], summary["page"], summary["output"]) == (str(folder), str(page), None)
+    assert "2 shapes" in page.read_text(encoding="utf-8")
+
+
+def test_files_of_several_shapes(
+    spem: Spem, refused: Refused, clubs: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Shapes of one name, a file in place of a folder, and files that are not of parts are refused."""
+    monkeypatch.chdir(tmp_path)
+    twin = tmp_path / "twin" / "club0.npy"
+    twin.parent.mkdir()
+    twin.write_bytes(clubs[0].read_bytes())
+    refused(spem("parts", clubs[0], twin, "-o", "out"), "club0.npy: both are named club0; rename one")
+    refused(spem("parts", *clubs, "-o", "out.npz"), "out.npz: 3 shapes are written to a folder")
+    refused(spem("parts", *clubs, "--mesh", "out.ply"), "out.ply: 3 shapes are written to a folder")
+    np.savez(tmp_path / "club1.npz", mask=np.load(clubs[1]))
+    refused(spem("parts", *clubs, "-o", "."), "club1.npz: is there already and not parts that spem wrote")
+    refused(spem("parts", clubs[0], "club1.npz", "-o", "."), "club1.npz: is a file that is read")
+    refused(spem("parts", *clubs, "-k", "auto", "-o", "out"), "-k auto: takes one shape, got 3")
+    refused(spem("parts", *clubs, "--curve"), "--curve: takes one shape, got 3")
+    refused(spem("parts", *clubs, "none.npy", "-o", "out"), "none.npy: no such file")
+    assert not list(tmp_path.glob("out*/*"))
+
+
+def test_unlike_shapes_are_told(spem: Spem, clubs: list[Path], tmp_path: Path) -> None:
+    """A shape whose interactions are unlike those of the others is named."""
+    np.save(tmp_path / "disk.npy", np.hypot(*np.mgrid[-12:13, -12:13]) < 11)
+    options = ("-k", "2", "--patches", "40", "-o", tmp_path / "out")
+    assert "unlike" not in spem("parts", *clubs, *options).stderr
+    result = spem("parts", *clubs[::2], tmp_path / "disk.npy", *options)
+    assert result.exit_code == 0, result.stderr
+    assert "is unlike" in result.stderr
+
+
+def test_several_shapes_that_do_not_fit_in_memory(
+    spem: Spem, refused: Refused, clubs: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Fields of all shapes are held at once, so they must fit in memory together."""
+    monkeypatch.setenv("SPEM_MEMORY_LIMIT", "160K")
+    result = spem("parts", *clubs, "--patches", "40", "-o", tmp_path / "out")
+    refused(result, "the fields of 3 shapes together need", "the limit is 160 KiB")
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -152,7 +243,8 @@ def test_components_apart_have_parts_apart(spem: Spem, tmp_path: Path) -> None:
         (("-k", "x"), ("-k x: expected a number of parts from 1 on, or auto",)),
         (("-k", "500"), ("-k 500: bone has 72 sources and 144 nodes; expected at most 72",)),
         (("--patches", "5", "-k", "6"), ("-k 6: bone has 5 sources",)),
-        (("--patches", "999"), ("too few for 999 patches",)),
+        (("--patches", "0"), ("--patches 0: expected a number of patches from 1 on, or all",)),
+        (("--patches", "some"), ("--patches some: expected",)),
         (("--sparsity", "-0.1"), ("--sparsity -0.1: expected 0 to less than 1, where all codes vanish",)),
         (("--sparsity", "1"), ("--sparsity 1: expected 0 to less than 1",)),
         (("--sparsity", "nan"), ("--sparsity nan",)),

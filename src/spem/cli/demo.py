@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,6 +22,10 @@ KINDS: tuple[str, ...] | None = None
 VOXELS = 8000
 ANSWERS = 5
 RHO = [0.05, 0.1, 0.2, 0.4]
+# Whose parts are shown, those that its first poses share: a trunk, a head, a tail and four legs.
+DIVIDED = "dog"
+POSES = 3
+PART_VOXELS = {2: 3000, 3: 6000}
 
 
 def demo(
@@ -30,7 +35,8 @@ def demo(
 ) -> None:
     """Make a collection, and all that can be made of it.
 
-    Creatures as silhouettes and as meshes, their codes, answers to a query, scores, pictures and a report.
+    Creatures as silhouettes and as meshes, their codes, answers to a query, scores, pictures of fields, maps
+    and parts, and a report.
 
     \b
     Examples:
@@ -77,7 +83,9 @@ def _collection(shapes: Path, written: list[Path], *, quiet: bool) -> dict[str, 
     report = root / f"{shapes.name}-{REPORT}"
     title = f"Creatures, {shapes.name}"
     page = write_collection_report(report, codes, classes, scores, distances=distances, title=title)
-    written += [*pictures, page]
+    divided = [path for path, name in zip(codes.paths, classes, strict=True) if name == DIVIDED]
+    parts = _divide((divided or codes.paths)[:POSES], root / f"{shapes.name}-parts.png")
+    written += [*pictures, *parts, page]
     return summary(scores)
 
 
@@ -103,3 +111,18 @@ def _draw(path: Path, fields_file: Path, maps_file: Path) -> None:
     titles = [f"ρ = {share:g} L" for share in RHO]
     write_figure(fields_file, figure_fields(shape, spem.field(shape, rho), titles))
     write_figure(maps_file, figure_maps(spem.maps(shape, 4)))
+
+
+def _divide(paths: Sequence[str], picture: Path) -> list[Path]:
+    """Draw the parts that poses share, those of meshes on a page to be turned too."""
+    import spem
+    from spem.cli.division import divide
+    from spem.cli.part_files import PartFiles
+    from spem.cli.parts import PartsRequest
+    from spem.shapes.kinds import MESH_SUFFIXES, has_suffix
+
+    solid = all(has_suffix(Path(path), MESH_SUFFIXES) for path in paths)
+    files = PartFiles(tuple(paths), None, picture, picture.with_suffix(".html") if solid else None, None)
+    shapes = [spem.read(path, voxels=PART_VOXELS[3 if solid else 2]) for path in paths]
+    files.write(divide(shapes, PartsRequest()))
+    return files.written()

@@ -8,24 +8,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from spem.api.parts import parts as matched_parts
-from spem.api.parts import sources as boundary_sources
-from spem.cli.output import counted
+from spem.api.parts import part_sources
+from spem.cli.output import complain, counted
+from spem.cli.parts import PARTS, PartsRequest
 from spem.cli.progress import Bar
 from spem.decomposition.choice import ErrorCurve, error_curve
 from spem.decomposition.division import boundary_parts, region_parts
+from spem.decomposition.joint import joint_parts
 from spem.decomposition.parts import Parts
 from spem.errors import ParameterError, SizeError
-from spem.fields.operator import Boundary
 from spem.fields.source_fields import SourceFields, solve_sources
 from spem.fields.sources import Sources
+from spem.shapes.limits import format_size, memory_limit_bytes
 
 if TYPE_CHECKING:
-    from spem.cli.parts import PartsRequest
     from spem.shapes.shape import Shape
 
-PATCHES = 200
 MOST_PARTS = 16
+# Cost of the alignment of two shapes above which their bodies differ, or something fuses in one of them.
+UNLIKE = 0.03
 
 
 @contextmanager
@@ -61,14 +62,14 @@ def divide(shapes: Sequence[Shape], request: PartsRequest) -> list[Parts]:
     SpemError
         When a shape cannot be divided as asked.
     """
+    rng = np.random.default_rng(request.seed)
     with naming_options():
+        fields = _solve(shapes, request, rng)
         if len(shapes) > 1:
-            return _divide_together(shapes, request)
-        rng = np.random.default_rng(request.seed)
-        fields = _fields(shapes[0], request, rng)
-        count = request.n_parts or _curve(fields, request, MOST_PARTS, rng).suggested
+            return _divide_together(fields, request, rng)
+        count = request.n_parts or _curve(fields[0], request, rng).suggested
         chosen = region_parts if request.over == "region" else boundary_parts
-        return [chosen(fields, count, sparsity=request.sparsity, rng=rng)]
+        return [chosen(fields[0], count, sparsity=request.sparsity, rng=rng)]
 
 
 def curve(shape: Shape, request: PartsRequest) -> ErrorCurve:
@@ -79,68 +80,64 @@ def curve(shape: Shape, request: PartsRequest) -> ErrorCurve:
     SpemError
         When the shape cannot be divided as asked.
     """
+    rng = np.random.default_rng(request.seed)
     with naming_options():
-        rng = np.random.default_rng(request.seed)
-        return _curve(_fields(shape, request, rng), request, request.n_parts or MOST_PARTS, rng)
+        return _curve(_solve([shape], request, rng)[0], request, rng)
 
 
-def default_patches(single: Sources) -> int:
-    """Return the number of patches of a boundary, its single points given: 200, if it has as many points."""
-    return max(min(PATCHES, single.n_sources), single.points.n_contours)
-
-
-def patch_boundary(
-    shape: Shape, count: int | None, boundary: Boundary, rng: np.random.Generator | None = None
-) -> Sources:
-    """Divide a boundary into patches, as many as asked for or by default.
-
-    Raises
-    ------
-    ParameterError
-        When there are fewer points, or more separate pieces, than patches.
-    """
-    if count is None:
-        count = default_patches(boundary_sources(shape, boundary=boundary))
-    return boundary_sources(shape, count, boundary=boundary, rng=rng)
-
-
-def _divide_together(shapes: Sequence[Shape], request: PartsRequest) -> list[Parts]:
-    """Divide several shapes so that one label is the same part in all."""
-    divided: list[Parts] = matched_parts(  # type: ignore[assignment]
-        shapes,  # type: ignore[arg-type]
-        request.n_parts or 1,
-        over=request.over,
-        rho=request.rho,
-        sparsity=request.sparsity,
-        n_patches=request.n_patches,
-        boundary=request.boundary,
-        rng=np.random.default_rng(request.seed),
-    )
-    return divided
-
-
-def _fields(shape: Shape, request: PartsRequest, rng: np.random.Generator) -> SourceFields:
-    """Solve for the fields of the sources of one shape."""
-    if request.n_patches is None and shape.ndim < 3:
-        sources = boundary_sources(shape, boundary=request.boundary)
-    else:
-        sources = patch_boundary(shape, request.n_patches, request.boundary, rng)
-    most = min(sources.n_sources, shape.n_nodes)
-    if request.n_parts is not None and request.n_parts > most:
-        what = f"{shape.name} has {counted(sources.n_sources, 'source')} and {counted(shape.n_nodes, 'node')}"
-        msg = f"-k {request.n_parts}: {what}; expected at most {most}"
-        raise ParameterError(msg)
+def _solve(shapes: Sequence[Shape], request: PartsRequest, rng: np.random.Generator) -> list[SourceFields]:
+    """Solve for the fields of the sources of all shapes, once it is known that they will do."""
+    several = [part_sources(shape, request.n_patches, boundary=request.boundary, rng=rng) for shape in shapes]
+    for sources in several:
+        _check_count(sources, request.n_parts)
+    _check_memory(several)
     with Bar() as bar:
-        return solve_sources(sources, request.rho, progress=bar.advance)
+        return [solve_sources(sources, request.rho, progress=bar.advance) for sources in several]
 
 
-def _curve(fields: SourceFields, request: PartsRequest, most: int, rng: np.random.Generator) -> ErrorCurve:
-    """Return the error curve up to a number of parts."""
+def _check_count(sources: Sources, n_parts: int | None) -> None:
+    """Refuse more parts than sources or nodes, before fields are solved for."""
+    name, m, n = sources.system.shape.name, sources.n_sources, sources.system.n_nodes
+    if n_parts is not None and n_parts > min(m, n):
+        what = f"{name} has {counted(m, 'source')} and {counted(n, 'node')}"
+        msg = f"-k {n_parts}: {what}; expected at most {min(m, n)}"
+        raise ParameterError(msg)
+
+
+def _check_memory(several: Sequence[Sources]) -> None:
+    """Refuse shapes whose fields do not fit in memory together; of a single one the solver sees to that."""
+    needed, limit = sum(8 * s.n_sources * s.system.n_nodes for s in several), memory_limit_bytes()
+    if len(several) > 1 and needed > limit:
+        sizes = f"{format_size(needed)}, the limit is {format_size(limit)}"
+        msg = f"the fields of {len(several)} shapes together need {sizes}; take fewer shapes"
+        raise SizeError(msg)
+
+
+def _divide_together(
+    fields: Sequence[SourceFields], request: PartsRequest, rng: np.random.Generator
+) -> list[Parts]:
+    """Divide several shapes so that one label is the same part in all; tell which are unlike the others."""
+    count = request.n_parts or PARTS
+    found = joint_parts(fields, count, over=request.over, sparsity=request.sparsity, rng=rng)
+    like = found.parts[found.reference].shape.name
+    for i, (parts, cost) in enumerate(zip(found.parts, found.costs, strict=True)):
+        if i != found.reference and cost > UNLIKE:
+            complain(f"note: {parts.shape.name} is unlike {like}; their parts may not be the same")
+    return list(found.parts)
+
+
+def _curve(fields: SourceFields, request: PartsRequest, rng: np.random.Generator) -> ErrorCurve:
+    """Return the error curve up to the number of parts asked for, or to its default."""
     with Bar() as bar:
 
         def advance(k: int, total: int) -> None:
             bar.advance("curve", k, total)
 
         return error_curve(
-            fields, most, over=request.over, sparsity=request.sparsity, rng=rng, progress=advance
+            fields,
+            request.n_parts or MOST_PARTS,
+            over=request.over,
+            sparsity=request.sparsity,
+            rng=rng,
+            progress=advance,
         )

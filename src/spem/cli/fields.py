@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
     from spem.shapes.shape import Shape
 
+PATCHES = 200
 Rho = Annotated[
     list[str] | None,
     typer.Option(
@@ -48,12 +49,14 @@ Rho = Annotated[
 Source = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="A,B[,C]", help="Source is the boundary node nearest to this point alone; repeatable."
+        metavar="A,B[,C]", help="Single source: the boundary node nearest to this point; repeatable."
     ),
 ]
 Patch = Annotated[
     list[str] | None,
-    typer.Option(metavar="A,B[,C]", help="Source is the patch of the boundary that is nearest; repeatable."),
+    typer.Option(
+        metavar="A,B[,C]", help="Single source: the patch of the boundary nearest to it; repeatable."
+    ),
 ]
 Patches = Annotated[
     int | None,
@@ -116,7 +119,7 @@ def field(
     if source or patch:
         from spem.cli.sources import SourceRequest, write_sources
 
-        request = SourceRequest(tuple(source or patch or ()), bool(patch), patches, boundary.value)
+        request = SourceRequest(tuple(source or patch or ()), bool(patch), patches or PATCHES, boundary.value)
         write_sources(found, request, screening, output, plot, json=json)
     else:
         _write(found, screening, boundary, output, plot, json=json)

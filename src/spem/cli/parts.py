@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from spem.decomposition.parts import Parts
     from spem.shapes.shape import Shape
 
-PARTS = 8
-AUTO = "auto"
+PARTS, SPARSITY, PATCHES = 8, 0.1, 200
+AUTO, ALL = "auto", "all"
 Count = Annotated[
     str | None,
     typer.Option(
@@ -55,10 +55,10 @@ OverBoundary = Annotated[
     typer.Option("--boundary-parts", help="Divide the boundary, and the region by it (5.2)."),
 ]
 Patches = Annotated[
-    int | None,
+    str,
     typer.Option(
-        min=1,
-        help="Number of patches of the boundary, one source each. [solids: 200; else every boundary node]",
+        metavar="M",
+        help="Number of patches of the boundary, a source each, or all: every boundary node is a source.",
     ),
 ]
 Curve = Annotated[
@@ -92,29 +92,29 @@ class PartsRequest:
     rho, sparsity
         Screening length, and relative λ.
     n_patches
-        Number of patches of the boundary; None for the default.
+        Number of patches of the boundary; None for every boundary node.
     boundary
         The boundary model.
     seed
         Of patches and starts.
     """
 
-    n_parts: int | None
-    over: Literal["region", "boundary"]
-    rho: float
-    sparsity: float
-    n_patches: int | None
-    boundary: Literal["surface", "voxel"]
-    seed: int
+    n_parts: int | None = PARTS
+    over: Literal["region", "boundary"] = "region"
+    rho: float = math.inf
+    sparsity: float = SPARSITY
+    n_patches: int | None = PATCHES
+    boundary: Literal["surface", "voxel"] = "voxel"
+    seed: int = 0
 
 
 def parts(
-    shapes: Annotated[list[str], typer.Argument(metavar="SHAPE...", help="Images, volumes or meshes.")],
+    shapes: Annotated[list[str], typer.Argument(metavar="SHAPE", help="Images, volumes or meshes.")],
     n_parts: Count = None,
-    sparsity: Sparsity = 0.1,
+    sparsity: Sparsity = SPARSITY,
     boundary_parts: OverBoundary = False,
     rho: Annotated[float, typer.Option(help="Screening length in the unit of the spacing.")] = math.inf,
-    patches: Patches = None,
+    patches: Patches = str(PATCHES),
     curve: Curve = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of patches and starts.")] = 0,
     output: PartsFile = None,
@@ -138,8 +138,8 @@ def parts(
 ) -> None:
     """Divide a shape into parts by sparse coding of the fields of its boundary sources.
 
-    Of several shapes, a label is the same part in all of them; shapes that cannot be read are refused.
-    Parts are numbered by size, the largest first; -1 stands for what no part explains.
+    Parts are numbered by size, the largest first; -1 stands for what no part explains. Several shapes are
+    divided together, and a label is the same part in all; if one of them fails, nothing is written.
 
     The file holds points (n, d), labels (n,), components, basis, sources (m, d), source_labels (m,),
     intensity, rho and spacing, and what `Parts.load` needs to make parts of it again. Of a mesh the
@@ -155,7 +155,7 @@ def parts(
     over: Literal["region", "boundary"] = "boundary" if boundary_parts else "region"
     count = _count(n_parts, len(shapes), curve=curve)
     _check_numbers(sparsity, rho)
-    request = PartsRequest(count, over, rho, sparsity, patches, boundary.value, seed)
+    request = PartsRequest(count, over, rho, sparsity, _patches(patches), boundary.value, seed)
     targets = PartFiles(tuple(shapes), output, plot, page, mesh)
     if curve:
         _check_curve_targets(shapes, targets)
@@ -191,6 +191,16 @@ def _count(text: str | None, n_shapes: int, *, curve: bool) -> int | None:
     if not (text.isdecimal() and int(text) > 0):
         other = "" if curve else f", or {AUTO}"
         msg = f"-k {text}: expected a number of parts from 1 on{other}"
+        raise ParameterError(msg)
+    return int(text)
+
+
+def _patches(text: str) -> int | None:
+    """Return the number of patches, None for every boundary node."""
+    if text == ALL:
+        return None
+    if not (text.isdecimal() and int(text) > 0):
+        msg = f"--patches {text}: expected a number of patches from 1 on, or {ALL}"
         raise ParameterError(msg)
     return int(text)
 

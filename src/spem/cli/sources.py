@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spem.api.parts import part_sources
 from spem.api.parts import sources as boundary_sources
-from spem.cli.division import naming_options, patch_boundary
+from spem.cli.division import naming_options
 from spem.cli.output import complain, counted, write_figure, write_npz
 from spem.cli.progress import Bar
 from spem.cli.results import about, summarise
@@ -37,14 +38,14 @@ class SourceRequest:
     as_patches
         Whether a source is a patch, or else one boundary node.
     n_patches
-        Number of patches that the boundary is divided into; None for 200, or as many as it has points.
+        Number of patches that the boundary is divided into, or as many as it has points.
     boundary
         The boundary model.
     """
 
     places: tuple[str, ...]
     as_patches: bool
-    n_patches: int | None
+    n_patches: int
     boundary: Boundary
 
 
@@ -118,7 +119,7 @@ def _choose(shape: Shape, request: SourceRequest) -> tuple[Sources, NDArray[np.f
     option = "--patch" if request.as_patches else "--source"
     places = [read_point(text, shape, option) for text in request.places]
     if request.as_patches:
-        found = patch_boundary(shape, request.n_patches, request.boundary)
+        found = part_sources(shape, request.n_patches, boundary=request.boundary)
     else:
         found = boundary_sources(shape, boundary=request.boundary)
     numbers, distance = found.nearest(places)

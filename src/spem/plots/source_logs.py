@@ -10,6 +10,7 @@ from spem.errors import ParameterError
 from spem.plots.camera import picture_aspect
 from spem.plots.fields import draw_line, draw_outline, draw_values
 from spem.plots.layout import colour_bar, curve_panels, panels
+from spem.plots.streams import mark_source
 from spem.plots.style import FIELD_CMAP, MUTED, TEXT_SIZE, bare
 from spem.plots.surfaces import picture_surface
 from spem.plots.values import node_columns
@@ -113,7 +114,7 @@ def _draw(
     draw_values(shape, log, ax, contours=True, limits=limits)
     draw_outline(shape, ax, width=0.7)
     if place is not None:
-        ax.plot(place[1], place[0], "o", markersize=4, color="white", markeredgecolor="black", clip_on=False)
+        mark_source(place, ax)
 
 
 def _scale(figure: Figure, ax: Axes, low: float) -> None:
