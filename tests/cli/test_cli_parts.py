@@ -93,7 +93,7 @@ def test_parts_are_those_of_the_library(spem: Spem, bone: Path, tmp_path: Path) 
 
 
 def test_sources_are_patches_or_every_node(spem: Spem, tmp_path: Path) -> None:
-    """Without --patches there are 200 sources where the boundary has as many nodes; `all` takes every node."""
+    """There are 200 sources where the boundary has as many nodes; `--patches all` takes every node."""
     np.save(tmp_path / "square.npy", np.pad(np.ones((60, 60), bool), 1))
     for options, count in (((), 200), (("--patches", "all"), 240)):
         run = spem("parts", tmp_path / "square.npy", "-k", "2", *options, "-o", tmp_path / "p.npz", "--json")
