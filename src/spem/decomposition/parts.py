@@ -108,7 +108,7 @@ class Parts:
             intensity=np.where(kept[:, 0], self.intensity[old], 0.0),
         )
 
-    def without_weak(self, threshold: float = 0.25) -> Parts:
+    def without_weak(self, threshold: float = 0.1) -> Parts:
         """Drop weak parts (Fig. 12); what they held goes to the strongest part left, or to none.
 
         Parameters
