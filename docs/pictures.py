@@ -14,8 +14,11 @@ from PIL import Image
 
 import spem
 from spem.plots.figures import figure_fields, figure_maps
+from spem.plots.parts import figure_parts
 from spem.plots.profiles import draw_basis, draw_profiles
+from spem.plots.sources import figure_source
 from spem.plots.thumbnails import thumbnail
+from spem.shapes.meshes import mesh_shape
 
 FOLDER = Path(__file__).parent / "images"
 
@@ -53,6 +56,20 @@ def main(folder: Path = FOLDER, *, share: float = 1.0) -> None:
         axis.set_xlabel("ρ, pixels")
     save(profiles, "profiles.png")
     save(answers(share), "answers.png")
+
+    every = spem.sources(flat).position
+    tip = spem.sources(flat, at=every[np.argmin(every[:, 0])])
+    save(figure_source(spem.source_fields(tip), 0), "source.png")
+    divisions = [spem.parts(flat), spem.parts(flat, over="boundary")]
+    save(figure_parts(divisions, ["of the region", "of the boundary"]), "parts.png")
+    save(poses(share), "parts-3d.png")
+
+
+def poses(share: float = 1.0) -> Figure:
+    """Draw the parts that poses of one kind share, on their own meshes."""
+    meshes = [spem.creatures.creature_mesh("dog", np.random.default_rng(seed), faces=8000) for seed in (1, 2, 5)]
+    shapes = [mesh_shape(*mesh, voxels=int(20_000 * share), name="dog") for mesh in meshes]
+    return figure_parts(spem.parts(shapes), meshes=meshes)
 
 
 def answers(share: float = 1.0) -> Figure:
