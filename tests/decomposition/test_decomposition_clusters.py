@@ -12,7 +12,7 @@ from spem.decomposition.measurements import centred_logs
 from spem.errors import ParameterError
 from spem.fields.operator import assemble
 from spem.fields.source_fields import SourceFields, solve_sources
-from spem.fields.sources import node_components, point_sources
+from spem.fields.sources import point_sources
 from spem.shapes.shape import Shape
 
 
@@ -48,7 +48,7 @@ def test_components_are_never_mixed(method):
     mask[:, :4] = mask[:, 7:] = 1
     fields = _fields(mask, "surface")
     clusters = cluster_interactions(fields, 2, method=method)
-    assert clusters.labels.tolist() == node_components(fields.sources.system).tolist()
+    assert clusters.labels.tolist() == fields.sources.system.domain.component.tolist()
     assert not np.isnan(clusters.centres).any()
     assert np.isneginf(clusters.centres[0]).sum() == 16
     edges = cluster_interactions(fields, 2, method=method, over="boundary")
@@ -104,4 +104,4 @@ def test_clusters_of_a_hand_are_connected(data_dir):
     clusters = cluster_interactions(_fields(shape.mask), 6)
     for k in range(6):
         piece = Shape.from_mask(shape.to_grid(clusters.labels, fill=-1) == k)
-        assert np.mean(node_components(assemble(piece)) == 0) > 0.95
+        assert np.mean(assemble(piece).domain.component == 0) > 0.95

@@ -19,7 +19,7 @@ from spem.decomposition.measurements import centred_logs
 from spem.errors import ParameterError
 from spem.fields.operator import assemble
 from spem.fields.source_fields import SourceFields, solve_sources
-from spem.fields.sources import node_components, point_sources
+from spem.fields.sources import point_sources
 from spem.shapes.shape import Shape
 
 
@@ -68,7 +68,7 @@ def test_correlations_are_symmetric_and_bounded(seed, boundary):
 def test_components_do_not_correlate():
     """Nodes and sources of different components have correlation 0, those of one what it alone would give."""
     fields = _two_squares()
-    component = node_components(fields.sources.system)
+    component = fields.sources.system.domain.component
     apart = component[:, None] != component
     found = node_correlation(fields, range(component.size))
     assert (found[apart] == 0).all()

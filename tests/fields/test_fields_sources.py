@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as hnp
 from spem.errors import ParameterError
 from spem.fields.operator import assemble
 from spem.fields.patches import patch_sources
-from spem.fields.sources import node_components, point_sources
+from spem.fields.sources import point_sources
 from spem.shapes.shape import Shape
 from spem.shapes.synthetic import disk
 
@@ -121,7 +121,7 @@ def test_twins_may_be_allowed(bar):
 def test_reach_of_sources_between_two_components():
     """An outside voxel between two components touches both, a cut point touches one."""
     shape = Shape.from_mask([[1, 1, 0, 1]])
-    assert node_components(assemble(shape)).tolist() == [0, 0, 1]
+    assert assemble(shape).domain.component.tolist() == [0, 0, 1]
     between = point_sources(assemble(shape, "voxel"))
     reach = between.reach.toarray()
     middle, _ = between.nearest((0.0, 2.0))
@@ -135,7 +135,7 @@ def test_reach_of_sources_between_two_components():
 def test_right_hand_sides_live_in_the_reach(mask, boundary):
     """A source's right-hand side is zero at the nodes of all components but those that it touches."""
     sources = point_sources(assemble(Shape.from_mask(mask), boundary))
-    component = node_components(sources.system)
+    component = sources.system.domain.component
     touched = np.zeros(sources.reach.shape, bool)
     node, source = sources.rhs.nonzero()
     touched[source, component[node]] = True

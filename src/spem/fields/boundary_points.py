@@ -23,7 +23,7 @@ class BoundaryPoints:
         ``(n_points, d)`` coordinates, in the shape's own coordinates.
     edge_point
         ``(n_boundary_edges,)`` point at the end of each boundary edge, in the order of
-        ``np.argwhere(neighbours == n_nodes)``.
+        `Domain.boundary_edges`.
     contour
         ``(n_points,)`` number of the contour of each point in 2-D, of its connected piece of boundary in
         other dimensions.
@@ -121,7 +121,7 @@ def point_graph(system: System, edge_point: NDArray[np.int32]) -> scipy.sparse.c
 def _ends(system: System) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Grid coordinates of the end of each boundary edge, and the voxel at the whole edge's end."""
     shape, domain = system.shape, system.domain
-    node, direction = np.nonzero(domain.neighbours == domain.n_nodes)
+    node, direction = domain.boundary_edges
     index = np.stack(np.unravel_index(shape.voxels[node], shape.mask.shape), axis=1).astype(np.float64)
     index[np.arange(node.size), direction // 2] += np.where(direction % 2, 1, -1) * domain.fraction
     strides = np.array([int(np.prod(shape.mask.shape[a + 1 :])) for a in range(shape.ndim)])

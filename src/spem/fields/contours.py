@@ -53,7 +53,7 @@ def face_neighbours(domain: Domain) -> NDArray[np.int32]:
            [0, 1]], dtype=int32)
     """
     n, directions = domain.neighbours.shape
-    node, direction = np.nonzero(domain.neighbours == n)
+    node, direction = domain.boundary_edges
     edge = np.full((n, directions), -1, np.int32)
     edge[node, direction] = np.arange(node.size, dtype=np.int32)
     return np.asarray(_turn(domain.neighbours, edge, node, direction))
@@ -89,7 +89,7 @@ def trace_contours(domain: Domain, area: NDArray[np.float64]) -> tuple[NDArray[n
     >>> order.tolist(), contour.tolist()
     ([0, 2, 1, 3], [0, 0, 0, 0])
     """
-    direction = np.nonzero(domain.neighbours == domain.n_nodes)[1]
+    _, direction = domain.boundary_edges
     onward = face_neighbours(domain)[np.arange(direction.size), _ONWARD[direction]]
     order, contour, hole = _follow(onward, _QUARTER[direction])
     length = np.bincount(contour, area)
@@ -127,7 +127,7 @@ def face_areas(domain: Domain, spacing: tuple[float, ...]) -> NDArray[np.float64
     >>> round(float(face_areas(surface_domain(shape), shape.spacing).sum() / np.pi), 1)
     2.0
     """
-    direction = np.nonzero(domain.neighbours == domain.n_nodes)[1]
+    _, direction = domain.boundary_edges
     face = np.prod(spacing) / np.asarray(spacing)
     own = np.zeros((direction.size, face.size))
     own[np.arange(direction.size), direction // 2] = np.where(direction % 2, 1.0, -1.0) * face[direction // 2]

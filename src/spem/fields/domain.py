@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+import scipy.sparse
 from numba import njit
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from spem.shapes.shape import FACE_FRACTION, Shape
 
@@ -22,7 +25,7 @@ class Domain:
         ``2 * axis + 1`` toward higher indices); ``n_nodes`` where the edge is a boundary edge.
     fraction
         ``(n_boundary_edges,)`` where the surface cuts each boundary edge, in (0, 1], in the order of
-        ``np.argwhere(neighbours == n_nodes)``.
+        `boundary_edges`.
     """
 
     neighbours: NDArray[np.int32]
@@ -32,6 +35,30 @@ class Domain:
     def n_nodes(self) -> int:
         """Number of nodes."""
         return int(self.neighbours.shape[0])
+
+    @cached_property
+    def boundary_edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """``(n_boundary_edges,)`` node and direction of each boundary edge, by node, then by direction."""
+        node, direction = np.nonzero(self.neighbours == self.n_nodes)
+        return node, direction
+
+    @cached_property
+    def component(self) -> NDArray[np.int32]:
+        """``(n_nodes,)`` connected component of each node, over uncut edges; by size, largest first.
+
+        Examples
+        --------
+        >>> voxel_domain(Shape.from_mask([1, 0, 1, 1])).component
+        array([1, 0, 0], dtype=int32)
+        """
+        n, upward = self.n_nodes, self.neighbours[:, 1::2]
+        node, axis = np.nonzero(upward < n)
+        ones = np.ones(node.size, np.int8)
+        graph = scipy.sparse.coo_array((ones, (node, upward[node, axis])), shape=(n, n)).tocsr()
+        count, component = connected_components(graph, directed=False)
+        rank = np.empty(count, np.int32)
+        rank[np.argsort(-np.bincount(component), kind="stable")] = np.arange(count, dtype=np.int32)
+        return np.asarray(rank[component])
 
 
 def surface_domain(shape: Shape) -> Domain:

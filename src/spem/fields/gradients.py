@@ -10,7 +10,7 @@ from spem.errors import ParameterError
 from spem.fields.domain import Domain
 from spem.fields.operator import System
 from spem.fields.source_fields import SourceFields
-from spem.fields.sources import Sources
+from spem.fields.sources import check_source
 
 # Ratios between neighbours beyond e^600 are taken for that, so that their squares are finite.
 _MAX_LOG = 600.0
@@ -30,7 +30,7 @@ def gradient(system: System, values: ArrayLike, *, boundary: ArrayLike | None = 
         ``(n_nodes,)`` the field.
     boundary
         Its value on the boundary: one number, or ``(n_boundary_edges,)`` in the order of
-        ``np.argwhere(neighbours == n_nodes)``; NaN or None where it is not known. There the difference to the
+        `Domain.boundary_edges`; NaN or None where it is not known. There the difference to the
         other side is taken, first order; with none, zero.
 
     Returns
@@ -133,7 +133,7 @@ def source_gradient(fields: SourceFields, source: int) -> NDArray[np.float64]:
     """
     check_source(fields.sources, source)
     with np.errstate(divide="ignore"):
-        ends = np.log((edge_sources(fields.sources) == source).astype(np.float64))
+        ends = np.log((fields.sources.edge_source == source).astype(np.float64))
     return log_gradient(fields.sources.system, fields.log[source], log_boundary=ends)
 
 
@@ -156,35 +156,6 @@ def unit_vectors(vectors: ArrayLike) -> NDArray[np.float64]:
     scaled = np.divide(array, largest, out=np.zeros_like(array), where=largest > 0)
     length = np.linalg.norm(scaled, axis=-1, keepdims=True)
     return np.asarray(np.divide(scaled, length, out=scaled, where=length > 0))
-
-
-def edge_sources(sources: Sources) -> NDArray[np.int32]:
-    """Return ``(n_boundary_edges,)`` number of the source at the end of each boundary edge, -1 for none.
-
-    Examples
-    --------
-    >>> from spem.fields.operator import assemble
-    >>> from spem.fields.sources import point_sources
-    >>> from spem.shapes.shape import Shape
-    >>> edge_sources(point_sources(assemble(Shape.from_mask([1, 0, 1]), "voxel")))
-    array([0, 1, 1, 2], dtype=int32)
-    """
-    return np.asarray(sources.group[sources.points.edge_point])
-
-
-def check_source(sources: Sources, source: int) -> None:
-    """Raise a `ParameterError` unless the number is that of a source.
-
-    Examples
-    --------
-    >>> from spem.fields.operator import assemble
-    >>> from spem.fields.sources import point_sources
-    >>> from spem.shapes.shape import Shape
-    >>> check_source(point_sources(assemble(Shape.from_mask(np.ones(3)))), 1)
-    """
-    if not 0 <= source < sources.n_sources:
-        msg = f"{sources.system.shape.name}: source {source}, expected 0 to {sources.n_sources - 1}"
-        raise ParameterError(msg)
 
 
 def _node_field(system: System, values: ArrayLike) -> NDArray[np.float64]:

@@ -95,7 +95,7 @@ def assemble(shape: Shape, boundary: Boundary = "surface") -> System:
         raise ParameterError(msg)
     domain = _DOMAINS[boundary](shape)
     weights = 1.0 / np.square(shape.spacing)
-    node, direction = np.nonzero(domain.neighbours == domain.n_nodes)
+    node, direction = domain.boundary_edges
     cut = weights[direction // 2]
     rhs = np.bincount(node, cut / domain.fraction, domain.n_nodes).astype(np.float64)
     diagonal = 2 * weights.sum() - np.bincount(node, cut, domain.n_nodes) + rhs

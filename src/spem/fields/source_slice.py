@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.sparse.csgraph
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError
@@ -42,15 +40,6 @@ class SourceSlice:
     solver: SourceSolver
     prepared: Prepared
 
-    @cached_property
-    def reach(self) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-        """``(n_nodes,)`` component of each node; ``(n_sources, n_components)`` those a source touches."""
-        sources, rhs = self.sources, self.sources.rhs
-        count, component = scipy.sparse.csgraph.connected_components(sources.system.matrix(), directed=False)
-        touched = np.zeros((sources.n_sources, count), bool)
-        touched[np.repeat(np.arange(sources.n_sources), np.diff(rhs.indptr)), component[rhs.indices]] = True
-        return component, touched
-
     def values(self, start: int, stop: int) -> NDArray[np.float64]:
         """Fields ``(stop - start, n_nodes)`` of consecutive sources."""
         if self.solver.entrywise:
@@ -60,11 +49,11 @@ class SourceSlice:
     def log(self, start: int, stop: int) -> NDArray[np.float64]:
         """Logarithms of the fields, ``(stop - start, n_nodes)``; -inf in components that a source misses."""
         require_entrywise(self.solver)
-        rhs, (component, touched) = self.sources.rhs[:, start:stop], self.reach
+        rhs, touched = self.sources.rhs[:, start:stop], self.sources.reach[start:stop].toarray()
         dense, exponent = scaled(rhs.toarray())
         log, low = logs(self.prepared.solve(dense), exponent)
-        if not touched[start:stop].all():
-            apart = ~touched[start:stop, component]
+        if not touched.all():
+            apart = ~touched[:, self.sources.system.domain.component]
             log[apart] = -np.inf
             low &= ~apart
         if low.any():

@@ -13,11 +13,10 @@ import zarr
 from numpy.typing import NDArray
 
 from spem.errors import ReadError
-from spem.fields.boundary_points import boundary_points
 from spem.fields.operator import assemble
 from spem.fields.source_fields import Progress
 from spem.fields.source_hyperfield import SourceHyperfield
-from spem.fields.sources import Sources
+from spem.fields.sources import restore_sources
 from spem.fields.storage import digest, pack_shape, put_in_place, unpack_shape, write_arrays
 
 FORMAT = 1
@@ -93,11 +92,8 @@ def load_source_hyperfield(path: str | Path, memory_limit: int | None = None) ->
         if digest(arrays) != attributes["sha256"]:
             raise _damaged(path, "its numbers are not those that were written")
         system = assemble(unpack_shape(arrays, attributes), attributes["boundary"])
-        points = boundary_points(system)
-        number = np.empty(points.n_points, np.int32)
-        number[points.edge_point] = arrays["edge_source"]
         stored = StoredBlocks(Path(path), _array(group, _FIELDS), _array(group, _HASHES), attributes["log"])
-        sources = Sources(system, points, number)
+        sources = restore_sources(system, arrays["edge_source"])
     except (KeyError, TypeError, ValueError, IndexError, RuntimeError, OSError) as error:
         raise _damaged(path, str(error)) from error
     return SourceHyperfield(sources, arrays["rho"], memory_limit=memory_limit, stored=stored)
@@ -166,7 +162,7 @@ def _begin(hyperfield: SourceHyperfield, draft: Path) -> zarr.Group:
     """Open the draft of a save that was stopped, if it is of the same hyperfield, or a new one."""
     sources, system = hyperfield.sources, hyperfield.sources.system
     arrays, attributes = pack_shape(hyperfield.shape)
-    arrays |= {"rho": hyperfield.rho, "edge_source": sources.group[sources.points.edge_point]}
+    arrays |= {"rho": hyperfield.rho, "edge_source": sources.edge_source}
     attributes |= {_MARK: FORMAT, "boundary": system.boundary, "log": hyperfield.blocks.log}
     attributes["sha256"] = digest(arrays)
     try:

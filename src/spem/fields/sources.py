@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from spem.errors import ParameterError
@@ -72,11 +71,16 @@ class Sources:
         return self.points.contour[first[group >= 0]]
 
     @cached_property
+    def edge_source(self) -> NDArray[np.int32]:
+        """``(n_boundary_edges,)`` source at the end of each boundary edge, -1 for none."""
+        return np.asarray(self.group[self.points.edge_point])
+
+    @cached_property
     def rhs(self) -> scipy.sparse.csc_array:
         """``(n_nodes, n_sources)`` right-hand sides: 1/(θ h²) of each edge, in its source's column."""
         domain = self.system.domain
-        node, direction = np.nonzero(domain.neighbours == domain.n_nodes)
-        source = self.group[self.points.edge_point]
+        node, direction = domain.boundary_edges
+        source = self.edge_source
         value = self.system.weights[direction // 2] / domain.fraction
         used = source >= 0
         shape = (domain.n_nodes, self.n_sources)
@@ -86,12 +90,11 @@ class Sources:
     def reach(self) -> scipy.sparse.csr_array:
         """``(n_sources, n_components)`` True where a source touches a connected component of nodes.
 
-        Components are those of `node_components`. An outside voxel between two components touches both; in
+        Components are those of `Domain.component`. An outside voxel between two components touches both; in
         all others the field of a source is zero.
         """
-        domain = self.system.domain
-        node, _ = np.nonzero(domain.neighbours == domain.n_nodes)
-        source, component = self.group[self.points.edge_point], node_components(self.system)
+        node, _ = self.system.domain.boundary_edges
+        source, component = self.edge_source, self.system.domain.component
         used = source >= 0
         shape = (self.n_sources, int(component.max()) + 1)
         touching = (np.ones(np.count_nonzero(used), bool), (source[used], component[node[used]]))
@@ -193,31 +196,35 @@ def point_sources(system: System) -> Sources:
     return Sources(system, points, np.arange(points.n_points, dtype=np.int32))
 
 
-def node_components(system: System) -> NDArray[np.int32]:
-    """Find the connected component of each node, over uncut edges.
-
-    Returns
-    -------
-    component
-        ``(n_nodes,)`` number of the component; by number of nodes, largest first.
+def restore_sources(system: System, edge_source: NDArray[np.integer]) -> Sources:
+    """Make sources again of their `Sources.edge_source`, which is in the order of the grid.
 
     Examples
     --------
     >>> import numpy as np
     >>> from spem.fields.operator import assemble
     >>> from spem.shapes.shape import Shape
-    >>> node_components(assemble(Shape.from_mask([1, 0, 1, 1])))
-    array([1, 0, 0], dtype=int32)
+    >>> restore_sources(assemble(Shape.from_mask(np.ones(3))), np.array([0, -1])).position
+    array([[-0.5]])
     """
-    neighbours, n = system.domain.neighbours, system.n_nodes
-    upward = neighbours[:, 1::2]
-    node, axis = np.nonzero(upward < n)
-    ones = np.ones(node.size, np.int8)
-    graph = scipy.sparse.coo_array((ones, (node, upward[node, axis])), shape=(n, n)).tocsr()
-    count, component = connected_components(graph, directed=False)
-    rank = np.empty(count, np.int32)
-    rank[np.argsort(-np.bincount(component), kind="stable")] = np.arange(count, dtype=np.int32)
-    return np.asarray(rank[component])
+    points = boundary_points(system)
+    group = np.full(points.n_points, -1, np.int32)
+    group[points.edge_point] = edge_source
+    return Sources(system, points, group)
+
+
+def check_source(sources: Sources, source: int) -> None:
+    """Raise a `ParameterError` unless the number is that of a source.
+
+    Examples
+    --------
+    >>> from spem.fields.operator import assemble
+    >>> from spem.shapes.shape import Shape
+    >>> check_source(point_sources(assemble(Shape.from_mask(np.ones(3)))), 1)
+    """
+    if not 0 <= source < sources.n_sources:
+        msg = f"{sources.system.shape.name}: source {source}, expected 0 to {sources.n_sources - 1}"
+        raise ParameterError(msg)
 
 
 def _checked_numbers(sources: ArrayLike, n: int, name: str) -> NDArray[np.int64]:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import ParameterError
-from spem.fields.gradients import check_source, edge_sources, source_gradient, unit_vectors
+from spem.fields.gradients import source_gradient, unit_vectors
 from spem.fields.operator import System
 from spem.fields.source_fields import SourceFields
+from spem.fields.sources import check_source
 from spem.fields.stepping import BOUNDARY, LENGTH, SOURCE, STAGNATION, follow
 
 ENDS = {BOUNDARY: "boundary", STAGNATION: "stagnation", LENGTH: "length", SOURCE: "source"}
@@ -144,8 +145,8 @@ def source_streamlines(
     """
     sources, system = fields.sources, fields.sources.system
     check_source(sources, source)
-    node, _ = np.nonzero(system.domain.neighbours == system.n_nodes)
-    mine = edge_sources(sources) == source
+    node, _ = system.domain.boundary_edges
+    mine = sources.edge_source == source
     height = fields.log[source].copy()
     height[node[mine]] = np.inf
     lines = _trace(system, source_gradient(fields, source), seeds, height, step, None)
@@ -224,7 +225,7 @@ def _trace(
         raise ParameterError(msg)
     most = int(min(longest / (step * spacing.min()), _MOST_POINTS)) + 1
     index = np.stack(np.unravel_index(shape.voxels, shape.mask.shape), axis=1).astype(np.float64)
-    edge = np.concatenate([[0], np.cumsum((domain.neighbours == domain.n_nodes).sum(axis=1))])
+    edge = np.searchsorted(domain.boundary_edges[0], np.arange(domain.n_nodes + 1))
     per_index = step * spacing.min() / spacing
     tables = (domain.neighbours, edge, domain.fraction)
     unit = unit_vectors(given)

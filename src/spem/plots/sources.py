@@ -9,7 +9,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Rectangle
 
 from spem.decomposition.measurements import Centre, measurements
-from spem.fields.gradients import check_source, source_gradient, unit_vectors
+from spem.fields.gradients import source_gradient, unit_vectors
+from spem.fields.sources import check_source
 from spem.fields.streamlines import even_nodes, source_streamlines
 from spem.plots.camera import Camera, picture_aspect, principal_view, view_rotation
 from spem.plots.fields import draw_outline, draw_values
