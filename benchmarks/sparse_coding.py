@@ -61,7 +61,7 @@ def main(argv: list[str] | None = None) -> None:
     radius = 8.0 if benchmark.quick else INNER_RADIUS
     with threadpool_limits(1):
         prepared(root / "tari1000" / f"{names[0]}.png", 5.0)
-        fit_counts(np.random.default_rng(0).random((2100, 5)), [2])  # compiles
+        list(fit_counts(np.random.default_rng(0).random((2100, 5)), [2]))  # compiles
         shapes = {name: prepared(root / "tari1000" / f"{name}.png", radius) for name in names}
         compare(benchmark, shapes)
         starts(benchmark, shapes)
@@ -190,7 +190,7 @@ def curves(benchmark: Benchmark, shapes: dict[str, tuple[float, Samples]]) -> No
     for name, (_, X) in shapes.items():
         for share in (0.0, SHARES[1]):
             sparsity = share * largest_sparsity(X)
-            seconds, coders = cpu(lambda x=X, s=sparsity: fit_counts(x, COUNTS, s, random_state=0))
+            seconds, coders = cpu(lambda x=X, s=sparsity: list(fit_counts(x, COUNTS, s, random_state=0)))
             values = np.array([coder.objective_ for coder in coders])
             rows.append(
                 {"shape": name, "λ": share, "seconds": seconds, "falls": bool((np.diff(values) < 0).all())}

@@ -85,11 +85,15 @@ def test_one_node_is_one_cluster():
 def test_bad_arguments_are_refused():
     """Too many clusters, none, no dimension and unknown words have their line."""
     fields = _fields(np.ones((2, 3)))
-    with pytest.raises(ParameterError, match="blob: n_clusters=7: expected 1 or more and at most 6"):
+    with pytest.raises(
+        ParameterError, match="blob: n_clusters=7: expected a whole number, 1 .* at most 6"
+    ):
         cluster_interactions(fields, 7)
     with pytest.raises(ParameterError, match="n_clusters=0"):
         cluster_interactions(fields, 0)
-    with pytest.raises(ParameterError, match="n_dimensions=0: expected 1 or more"):
+    with pytest.raises(ParameterError, match=r"n_clusters=2\.5: expected a whole number"):
+        cluster_interactions(fields, 2.5)
+    with pytest.raises(ParameterError, match="n_dimensions=0: expected a whole number, 1 or more"):
         cluster_interactions(fields, 2, n_dimensions=0)
     with pytest.raises(ParameterError, match="method='ward': expected 'kmeans' or 'mixture'"):
         cluster_interactions(fields, 2, method="ward")

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import spem
 from spem.decomposition.division import boundary_parts, region_parts
-from spem.decomposition.parts import Parts
+from spem.decomposition.parts import Parts, touched_part
 from spem.errors import ParameterError, ReadError
 from spem.fields.operator import assemble
 from spem.fields.patches import patch_sources
 from spem.fields.source_fields import solve_sources
 from spem.fields.sources import point_sources
-from spem.shapes.shape import Shape
+from spem.shapes.shape import Cuts, Shape
 
 ARRAYS = ("components", "basis", "node_labels", "source_labels", "intensity")
 
@@ -145,3 +147,12 @@ def test_parts_that_cannot_be_written_leave_no_file(tmp_path):
     with pytest.raises(ParameterError, match="cannot be written"):
         _bar().save(tmp_path / "absent" / "parts.npz")
     assert not list(tmp_path.iterdir())
+
+
+def test_source_is_of_the_part_that_most_of_its_edges_lead_to():
+    """However near the surface comes to one node, the edges of the others outvote it."""
+    framed = Shape.from_mask(np.ones((1, 4)))
+    cut = Cuts(framed.voxels[:1], np.array([0], np.uint8), np.array([1e-6]))
+    points = point_sources(assemble(Shape(framed.mask, framed.spacing, framed.origin, cuts=cut)))
+    whole = replace(points, group=np.zeros(points.n_sources, np.int32))
+    assert touched_part(whole, np.array([0, 1, 1, 1], np.int32), 2).tolist() == [1]

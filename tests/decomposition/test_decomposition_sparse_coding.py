@@ -110,7 +110,7 @@ def test_known_atoms_are_where_the_fit_starts(samples):
 
 def test_curve_over_counts_falls(samples):
     """More components never explain less."""
-    coders = fit_counts(samples, range(1, 7), 0.02, random_state=0)
+    coders = list(fit_counts(samples, range(1, 7), 0.02, random_state=0))
     assert [coder.n_components for coder in coders] == [1, 2, 3, 4, 5, 6]
     assert (np.diff([coder.objective_ for coder in coders]) < 0).all()
 

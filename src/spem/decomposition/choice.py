@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spem.decomposition.division import SPARSITY, check_division, limit_of
 from spem.decomposition.measurements import Centre, Over, measurements
-from spem.decomposition.sparse_coding import NonnegativeSparseCoding
+from spem.decomposition.sparse_coding import fit_counts
 from spem.errors import ParameterError
 from spem.fields.source_fields import SourceFields
 
@@ -109,14 +109,11 @@ def error_curve(
     weight = sparsity * limit_of(samples, fields)
     seed = int((rng or np.random.default_rng(0)).integers(2**31))
     whole = float(np.vdot(samples, samples)) / 2
+    coders = fit_counts(samples, range(1, most + 1), weight, n_init=n_init, tol=_TOL, random_state=seed)
     errors: list[float] = []
-    atoms = None
-    for k in range(1, most + 1):
-        start = "farthest" if atoms is None else atoms
-        coder = NonnegativeSparseCoding(k, weight, init=start, n_init=n_init, tol=_TOL, random_state=seed)
-        atoms = coder.fit(samples).components_
+    for coder in coders:
         errors.append(coder.objective_ / whole)
         if progress is not None:
-            progress(k, most)
+            progress(coder.n_components, most)
     # a start from the components before cannot end above them but for the tolerance of the descent
     return ErrorCurve(np.arange(1, most + 1), np.minimum.accumulate(errors))

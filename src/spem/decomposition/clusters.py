@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,9 +118,13 @@ def cluster_interactions(
     centred = centred_logs(fields, over=over)
     vectors = centred.T if over == "region" else centred
     name, n = fields.sources.system.shape.name, len(vectors)
-    for what, value, most in (("n_clusters", n_clusters, n), ("n_dimensions", n_dimensions, np.inf)):
-        if not 1 <= value <= most:
-            msg = f"{name}: {what}={value}: expected 1 or more" + (f" and at most {n}" if most == n else "")
+    counts: tuple[tuple[str, Any, str, float], ...] = (
+        ("n_clusters", n_clusters, f" and at most {n}", n),
+        ("n_dimensions", n_dimensions, "", np.inf),
+    )
+    for what, value, bound, most in counts:
+        if not isinstance(value, int | np.integer) or not 1 <= value <= most:
+            msg = f"{name}: {what}={value}: expected a whole number, 1 or more{bound}"
             raise ParameterError(msg)
     reduced = _reduce(vectors, n_dimensions)
     seed = int((rng or np.random.default_rng(0)).integers(2**31))

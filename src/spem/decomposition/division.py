@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -166,18 +168,18 @@ def _divide(
     return parts.relabelled(_by_size(parts))
 
 
-def check_division(fields: SourceFields, n_parts: int, sparsity: float) -> None:
+def check_division(fields: SourceFields, n_parts: Any, sparsity: float) -> None:
     """Refuse a number of parts or a sparsity that cannot be.
 
     Raises
     ------
     ParameterError
-        When `n_parts` is more than the sources or nodes, or `sparsity` is not in [0, 1).
+        When `n_parts` is no whole number or more than the sources or nodes, or `sparsity` is not in [0, 1).
     """
     sources, name = fields.sources, fields.sources.system.shape.name
     n_nodes = sources.system.n_nodes
     most = min(sources.n_sources, n_nodes)
-    if not 1 <= n_parts <= most:
+    if not isinstance(n_parts, int | np.integer) or not 1 <= n_parts <= most:
         counts = f"{sources.n_sources} sources and {n_nodes} nodes"
         msg = f"{name}: n_parts={n_parts}: expected 1 to {most}, for it has {counts}"
         raise ParameterError(msg)

@@ -197,10 +197,9 @@ def touched_part(sources: Sources, node_labels: NDArray[np.int32], n_parts: int)
         Number of parts.
     """
     touched = np.zeros((n_parts, sources.n_sources))
-    edges = sources.rhs.tocoo()
-    label = node_labels[edges.row]
-    inside = label >= 0
-    np.add.at(touched, (label[inside], edges.col[inside]), edges.data[inside])
+    label, source = node_labels[sources.system.domain.boundary_edges[0]], sources.edge_source
+    used = (label >= 0) & (source >= 0)
+    np.add.at(touched, (label[used], source[used]), 1.0)
     return strongest_part(touched)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any, Self
 
 import numpy as np
@@ -40,10 +40,10 @@ def fit_counts(
     max_iter: int = 500,
     tol: float = 1e-5,
     random_state: int | None = None,
-) -> list[NonnegativeSparseCoding]:
-    """Fit a coder for each of several numbers of components, for the curve of `objective_` against k.
+) -> Iterator[NonnegativeSparseCoding]:
+    """Fit a coder for each of several numbers of components, one at a time.
 
-    Each fit starts from the atoms of the one before, and from others, so that the curve falls.
+    Each fit starts from the atoms of the one before, and from others, so that `objective_` falls.
 
     Parameters
     ----------
@@ -60,9 +60,8 @@ def fit_counts(
     >>> [round(coder.objective_, 6) for coder in fit_counts(X, [1, 2])]
     [4.5, 0.0]
     """
-    coders: list[NonnegativeSparseCoding] = []
+    known = None
     for count in counts:
-        known = coders[-1].components_[:count] if coders else None
         coder = NonnegativeSparseCoding(
             count,
             sparsity,
@@ -72,8 +71,8 @@ def fit_counts(
             tol=tol,
             random_state=random_state,
         )
-        coders.append(coder.fit(X))
-    return coders
+        known = coder.fit(X).components_
+        yield coder
 
 
 class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  # type: ignore[misc]
