@@ -85,9 +85,7 @@ def test_one_node_is_one_cluster():
 def test_bad_arguments_are_refused():
     """Too many clusters, none, no dimension and unknown words have their line."""
     fields = _fields(np.ones((2, 3)))
-    with pytest.raises(
-        ParameterError, match="blob: n_clusters=7: expected a whole number, 1 .* at most 6"
-    ):
+    with pytest.raises(ParameterError, match=r"blob: n_clusters=7: expected a whole number, 1 .* at most 6"):
         cluster_interactions(fields, 7)
     with pytest.raises(ParameterError, match="n_clusters=0"):
         cluster_interactions(fields, 0)

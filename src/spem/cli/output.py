@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from spem.codes.files import write_whole
 from spem.errors import ParameterError
+from spem.files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

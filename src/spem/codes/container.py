@@ -13,8 +13,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.codes.files import write_whole
 from spem.errors import ModelError, ReadError
+from spem.files import write_whole
 from spem.shapes.kinds import kind_of
 
 # Raised when the layout of the file changes: names of arrays, keys of the header, the hash.

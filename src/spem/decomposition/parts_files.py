@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import secrets
 import zipfile
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.decomposition.parts import Parts
-from spem.errors import ParameterError, ReadError, SpemError
-from spem.fields.boundary_points import boundary_points
+from spem.errors import ReadError, SpemError
 from spem.fields.operator import assemble
-from spem.fields.sources import Sources
-from spem.shapes.shape import Cuts, Report, Shape
+from spem.fields.sources import restore_sources
+from spem.files import write_whole
+from spem.shapes.packing import pack_shape, unpack_shape
 
 FORMAT = 1
 # What zipfile, numpy and json raise on bytes that are not what they expect.
@@ -66,17 +64,8 @@ def save_parts(parts: Parts, path: str | os.PathLike[str]) -> None:
     ...     load_parts(f"{folder}/bar.npz")
     Parts('bar', 2 parts of its region, rho inf, sizes 50, 50 %)
     """
-    target = Path(path)
-    draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-    try:
-        with draft.open("xb") as file:
-            np.savez(file, allow_pickle=False, **_arrays(parts))
-        draft.replace(target)
-    except OSError as error:
-        msg = f"{target}: cannot be written ({error.strerror}); give a file in a writable folder with room"
-        raise ParameterError(msg) from error
-    finally:
-        draft.unlink(missing_ok=True)
+    arrays = _arrays(parts)
+    write_whole(path, lambda file: np.savez(file, allow_pickle=False, **arrays))
 
 
 def load_parts(path: str | os.PathLike[str]) -> Parts:
@@ -110,16 +99,9 @@ def load_parts(path: str | os.PathLike[str]) -> Parts:
 def _arrays(parts: Parts) -> dict[str, NDArray[Any]]:
     """Everything as plain arrays, and a line of JSON."""
     shape, sources = parts.shape, parts.sources
-    about = {
-        "format": FORMAT,
-        "name": shape.name,
-        "grid": shape.mask.shape,
-        "origin": shape.origin,
-        "boundary": sources.system.boundary,
-        "over": parts.over,
-        "report": asdict(shape.report),
-    }
-    arrays: dict[str, NDArray[Any]] = {
+    packed, attributes = pack_shape(shape)
+    about = attributes | {"format": FORMAT, "boundary": sources.system.boundary, "over": parts.over}
+    return packed | {
         "points": shape.points,
         "labels": parts.node_labels,
         "components": parts.components,
@@ -129,36 +111,16 @@ def _arrays(parts: Parts) -> dict[str, NDArray[Any]]:
         "intensity": parts.intensity,
         "rho": np.array(parts.rho),
         "spacing": np.array(shape.spacing),
-        "voxels": shape.voxels,
-        "cut_voxel": shape.cuts.voxel,
-        "cut_direction": shape.cuts.direction,
-        "cut_fraction": shape.cuts.fraction,
-        # by edge, for that order is the grid's
-        "edge_source": sources.group[sources.points.edge_point],
+        "edge_source": sources.edge_source,
         "about": np.array(json.dumps(about)),
     }
-    return arrays if shape.affine is None else arrays | {"affine": shape.affine}
 
 
 def _assemble(about: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Parts:
     """Put shape, sources and parts together from what was stored."""
-    mask = np.zeros(about["grid"], bool)
-    mask.reshape(-1)[arrays["voxels"]] = True
-    shape = Shape(
-        mask,
-        tuple(map(float, arrays["spacing"])),
-        tuple(about["origin"]),
-        about["name"],
-        Cuts(arrays["cut_voxel"], arrays["cut_direction"], arrays["cut_fraction"]),
-        Report(**{**about["report"], "repairs": tuple(about["report"]["repairs"])}),
-        arrays.get("affine"),
-    )
-    system = assemble(shape, about["boundary"])
-    points = boundary_points(system)
-    group = np.full(points.n_points, -1, np.int32)
-    group[points.edge_point] = arrays["edge_source"]
+    system = assemble(unpack_shape(arrays, about), about["boundary"])
     parts = Parts(
-        Sources(system, points, group),
+        restore_sources(system, arrays["edge_source"]),
         float(arrays["rho"]),
         about["over"],
         arrays["components"],

@@ -17,7 +17,8 @@ from spem.fields.operator import assemble
 from spem.fields.source_fields import Progress
 from spem.fields.source_hyperfield import SourceHyperfield
 from spem.fields.sources import restore_sources
-from spem.fields.storage import digest, pack_shape, put_in_place, unpack_shape, write_arrays
+from spem.fields.storage import digest, put_in_place, write_arrays
+from spem.shapes.packing import pack_shape, unpack_shape
 
 FORMAT = 1
 _MARK = "spem_source_hyperfield"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from spem.errors import ReadError
 from spem.fields.hyperfield import Hyperfield
-from spem.shapes.shape import Cuts, Report, Shape
+from spem.shapes.packing import pack_shape, unpack_shape
 
 FORMAT = 1
 # Nodes in a chunk: about a megabyte of basis.
@@ -97,43 +96,6 @@ def load_hyperfield(path: str | Path) -> Hyperfield:
         reason = str(error)
     msg = f"{path}: the hyperfield is damaged ({reason}); write it again"
     raise ReadError(msg)
-
-
-def pack_shape(shape: Shape) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Return a shape as named arrays and as attributes, for `unpack_shape`."""
-    cuts = shape.cuts
-    arrays: dict[str, NDArray[Any]] = {
-        "voxels": shape.voxels,
-        "cut_voxel": cuts.voxel,
-        "cut_direction": cuts.direction,
-        "cut_fraction": cuts.fraction,
-    }
-    if shape.affine is not None:
-        arrays["affine"] = shape.affine
-    attributes: dict[str, Any] = {
-        "name": shape.name,
-        "grid": list(shape.mask.shape),
-        "spacing": list(shape.spacing),
-        "origin": list(shape.origin),
-        "report": asdict(shape.report),
-    }
-    return arrays, attributes
-
-
-def unpack_shape(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> Shape:
-    """Put a shape together from what `pack_shape` made of it."""
-    mask = np.zeros(attributes["grid"], bool)
-    mask.reshape(-1)[arrays["voxels"]] = True
-    report = attributes["report"]
-    return Shape(
-        mask,
-        tuple(attributes["spacing"]),
-        tuple(attributes["origin"]),
-        attributes["name"],
-        Cuts(arrays["cut_voxel"], arrays["cut_direction"], arrays["cut_fraction"]),
-        Report(**{**report, "repairs": tuple(report["repairs"])}),
-        arrays.get("affine"),
-    )
 
 
 def write_arrays(group: zarr.Group, arrays: dict[str, NDArray[Any]]) -> None:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.colors import to_hex
 
-from spem.codes.files import write_whole
 from spem.errors import ParameterError, ShapeError
+from spem.files import write_whole
 from spem.plots.camera import picture_aspect, principal_view, view_rotation
 from spem.plots.markup import data_uri, page, text
 from spem.plots.part_surface import part_surface

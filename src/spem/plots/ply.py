@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from spem.codes.files import write_whole
 from spem.decomposition.transfer import vertex_labels
 from spem.errors import ParameterError
+from spem.files import write_whole
 from spem.plots.part_surface import part_surface
 from spem.plots.style import part_colours
 

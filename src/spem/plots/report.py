@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from spem.codes.files import write_whole
 from spem.errors import LabelError, ParameterError
+from spem.files import write_whole
 from spem.plots.markup import page
 from spem.plots.report_gallery import Gallery, shapes_section
 from spem.plots.report_queries import queries_section
