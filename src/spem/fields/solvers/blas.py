@@ -1,22 +1,20 @@
-"""Threads of the dense algebra: many small blocks are faster on one, a few large ones on all."""
+"""One thread for the dense algebra of a factorisation."""
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from functools import cache
 from typing import Any
 
 from threadpoolctl import ThreadpoolController
 
-# Factors of fewer numbers than this consist of blocks so small that threads wait for each other more than
-# they work; on a busy machine by far.
-_SMALL = 5_000_000
 
+def one_thread() -> AbstractContextManager[Any]:
+    """Limit dense algebra to one thread inside the context.
 
-def threads_for(n_entries: int) -> AbstractContextManager[Any]:
-    """Limit dense algebra to one thread inside the context if a factor has few numbers."""
-    if n_entries >= _SMALL:
-        return nullcontext()
+    A factorisation is a long row of blocks, most of them small: on a free machine more threads gain a third on
+    the largest, on a busy one they wait for each other fifty times longer than they work.
+    """
     limit: AbstractContextManager[Any] = _controller().limit(limits=1, user_api="blas")
     return limit
 

@@ -12,7 +12,7 @@ from scipy.linalg.lapack import dpotrf
 
 from spem.errors import ParameterError, SizeError
 from spem.fields.operator import System
-from spem.fields.solvers.blas import threads_for
+from spem.fields.solvers.blas import one_thread
 from spem.fields.solvers.dissection import Dissection, dissect
 from spem.shapes.limits import memory_limit_bytes
 
@@ -50,7 +50,7 @@ class Factor:
         """Solve for right-hand sides ``(n_nodes,)`` or ``(n_nodes, k)``; the result has their shape."""
         d = self.dissection
         x = np.array(rhs.reshape(d.order.size, -1)[d.order], np.float64, order="C")
-        with threads_for(d.n_entries):
+        with one_thread():
             self._forward(x)
             self._backward(x)
         solution = np.empty_like(x)
@@ -117,7 +117,7 @@ def factorize(system: System, shift: float, *, memory_limit: int | None = None) 
     if not np.isfinite(values).all():
         msg = f"{system.shape.name}: 1/rho² = {shift:g} is beyond what numbers hold; use a larger rho"
         raise ParameterError(msg)
-    with threads_for(d.n_entries):
+    with one_thread():
         return Factor(d, *_eliminate(system, values, d))
 
 
