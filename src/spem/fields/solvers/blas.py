@@ -12,8 +12,8 @@ from threadpoolctl import ThreadpoolController
 def one_thread() -> AbstractContextManager[Any]:
     """Limit dense algebra to one thread inside the context.
 
-    A factorisation is a long row of blocks, most of them small: on a free machine more threads gain a third on
-    the largest, on a busy one they wait for each other fifty times longer than they work.
+    A factorisation is a long row of blocks, most of them small: more threads gain little on a free machine,
+    and on a busy one they wait for each other many times longer than they work.
     """
     limit: AbstractContextManager[Any] = _controller().limit(limits=1, user_api="blas")
     return limit
