@@ -24,7 +24,7 @@ def region_parts(
     *,
     sparsity: float = SPARSITY,
     centre: Centre = "mean",
-    n_init: int = 4,
+    n_init: int = 8,
     rng: np.random.Generator | None = None,
 ) -> Parts:
     """Divide the region of a shape into parts (4.1): nodes with like interactions belong together.
@@ -72,7 +72,7 @@ def boundary_parts(
     *,
     sparsity: float = SPARSITY,
     centre: Centre = "mean",
-    n_init: int = 4,
+    n_init: int = 8,
     rng: np.random.Generator | None = None,
 ) -> Parts:
     """Divide the boundary of a shape into parts, with the region that each owns (5.2).
