@@ -26,7 +26,7 @@ def test_panels_share_a_scale_from_the_least_log_to_zero(square: Shape) -> None:
     assert [image.get_clim() for image in images] == [(-30, 0)] * 2
     assert all(np.isfinite(image.get_array()).all() for image in images)
     bar = figure.axes[-1]
-    assert (bar.get_title(), bar.get_xlabel()) == ("log v", "−30")
+    assert (bar.get_title(), bar.get_xlabel()) == ("log v\n0", "−30")
     assert isinstance(images[0].norm, Normalize)
 
 

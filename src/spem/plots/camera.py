@@ -158,6 +158,26 @@ def picture_aspect(shape: Shape, view: View | None = None) -> float:
     return float(np.clip(seen, 0.125, 4.0))
 
 
+def picture_size(shape: Shape, width: float, view: View | None = None) -> tuple[int, int]:
+    """Return the width and height in pixels of the picture of a shape, at least 32 wide.
+
+    Parameters
+    ----------
+    shape, view
+        As for `picture_aspect`.
+    width
+        Wanted width in pixels.
+
+    Examples
+    --------
+    >>> from spem.shapes.shape import Shape
+    >>> picture_size(Shape.from_mask(np.ones((2, 6))), 99.6)
+    (100, 50)
+    """
+    pixels = max(32, round(width))
+    return pixels, max(1, round(pixels * picture_aspect(shape, view)))
+
+
 def principal_view(points: ArrayLike) -> NDArray[np.float64]:
     """Return a view onto the broad side of a set of points, their longest extent to the right.
 

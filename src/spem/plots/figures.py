@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spem.errors import ParameterError
-from spem.plots.camera import picture_aspect, principal_view, view_rotation
+from spem.plots.camera import picture_aspect, picture_size, principal_view, view_rotation
 from spem.plots.fields import draw_line, draw_outline, draw_slice, draw_values
 from spem.plots.layout import colour_bar, curve_panels, panels
 from spem.plots.raster import SHARPNESS, render_surface
@@ -245,8 +245,7 @@ def _fill_surfaces(
     """
     rotation = principal_view(shape.points) if view is None else view_rotation(view)
     surface = shape_surface(shape, int(np.abs(rotation[2]).argmax()), toward=rotation[2])
-    pixels = round(SHARPNESS * axes[0].bbox.width)
-    size = (pixels, max(1, round(pixels * picture_aspect(shape, rotation))))
+    size = picture_size(shape, SHARPNESS * axes[0].bbox.width, rotation)
     for ax, column, ends, known in zip(axes, values.T, limits, boundary, strict=True):
         shown = surface_values(shape, surface, column, boundary=known)
         picture = render_surface(

@@ -30,6 +30,8 @@ MARGIN, GAP, TITLE = 0.06, 0.12, 0.27
 # From the last panel to the scale, its width, and its words.
 BAR = (0.12, 0.1, 0.24)
 BAR_HEIGHT = 2.0
+# Room below a scale for its least value.
+BAR_FOOT = 0.19
 # From the last panel to the key of colours, and the room of each entry: its patch, a letter, its height.
 KEY_GAP, KEY_PATCH, KEY_LETTER, KEY_HEIGHT = 0.08, 0.3, 0.061, 0.175
 
@@ -147,6 +149,33 @@ def colour_bar(
     bar.set_ticks(list(np.linspace(*limits, len(words))), labels=list(words))
     bar.ax.tick_params(length=0, labelsize=TEXT_SIZE, labelcolor=MUTED)
     bar.outline.set_visible(False)
+
+
+def value_bar(figure: Figure, ax: Axes, cmap: str, limits: tuple[float, float], what: str) -> None:
+    r"""Draw the scale of `colour_bar` with its ends above and below, where there is room for digits.
+
+    Parameters
+    ----------
+    figure, ax, cmap, limits
+        As for `colour_bar`.
+    what
+        What the scale is of, to stand above.
+
+    Examples
+    --------
+    >>> figure, axes = panels(1, bar=True)
+    >>> value_bar(figure, axes[0], "viridis", (-12.5, 0), "log v")
+    >>> figure.axes[-1].get_title(), figure.axes[-1].get_xlabel()
+    ('log v\n0', '−12.5')
+    """
+    colour_bar(figure, ax, cmap, limits, [""])
+    bar = figure.axes[-1]
+    above, below = (f"{end:.3g}".replace("-", "−") for end in reversed(limits))
+    place = bar.get_position()
+    foot = min(max(place.y0, BAR_FOOT / figure.get_figheight()), place.y1 - place.height / 4)
+    bar.set_position((place.x0, foot, place.width, place.y1 - foot))
+    bar.set_title(f"{what}\n{above}", fontsize=TEXT_SIZE, color=MUTED, pad=4)
+    bar.set_xlabel(below, fontsize=TEXT_SIZE, color=MUTED, labelpad=4)
 
 
 def colour_key(figure: Figure, colours: ArrayLike, words: Sequence[str]) -> Legend:

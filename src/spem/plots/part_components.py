@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 
 from spem.plots.boundary_lines import draw_boundary
-from spem.plots.camera import picture_aspect, principal_view, view_rotation
+from spem.plots.camera import picture_aspect, picture_size, principal_view, view_rotation
 from spem.plots.fields import draw_line, draw_values
 from spem.plots.layout import curve_panels, panels
 from spem.plots.raster import SHARPNESS, render_surface
@@ -125,8 +125,7 @@ def _draw_surfaces(
     """Draw each component on the surface of a three-dimensional shape."""
     rotation = principal_view(shape.points) if view is None else view_rotation(view)
     surface = shape_surface(shape)
-    pixels = max(32, round(SHARPNESS * axes[0].bbox.width))
-    size = (pixels, max(1, round(pixels * picture_aspect(shape, rotation))))
+    size = picture_size(shape, SHARPNESS * axes[0].bbox.width, rotation)
     for j, ax in zip(drawn, axes, strict=True):
         weights = nodes[j]
         picture = render_surface(

@@ -9,7 +9,7 @@ from scipy.ndimage import binary_dilation, distance_transform_edt
 
 from spem.plots.borders import Borders
 from spem.plots.boundary_lines import draw_boundary
-from spem.plots.camera import picture_aspect, principal_view, view_rotation
+from spem.plots.camera import picture_size, principal_view, view_rotation
 from spem.plots.fields import draw_outline
 from spem.plots.level import surface_level
 from spem.plots.part_surface import part_surface
@@ -149,8 +149,7 @@ def _draw_surface(
     shape: Shape, node_labels: NDArray[np.int32], ax: Axes, view: View | None, mesh: Mesh | None
 ) -> AxesImage:
     """Draw the surface of a three-dimensional shape, a little finer than the axis is in pixels."""
-    pixels = max(32, round(SHARPNESS * ax.bbox.width))
-    size = (pixels, max(1, round(pixels * picture_aspect(shape, view))))
+    size = picture_size(shape, SHARPNESS * ax.bbox.width, view)
     picture = picture_parts(shape, node_labels, view=view, mesh=mesh, size=size)
     bare(ax)
     return ax.imshow(picture, interpolation="antialiased")

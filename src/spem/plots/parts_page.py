@@ -14,7 +14,7 @@ from matplotlib.colors import to_hex
 
 from spem.errors import ParameterError, ShapeError
 from spem.files import write_whole
-from spem.plots.camera import picture_aspect, principal_view, view_rotation
+from spem.plots.camera import picture_size, principal_view, view_rotation
 from spem.plots.markup import data_uri, page, text
 from spem.plots.part_surface import part_surface
 from spem.plots.raster import AMBIENT, FILL_LIGHT, KEY_LIGHT, render_surface
@@ -157,7 +157,7 @@ def _scene(
 
 def _still(shape: Shape, surface: PartSurface, rotation: NDArray[np.float64]) -> str:
     """Figure of one shape for where the page cannot draw, with its name."""
-    size = (STILL, max(1, round(STILL * picture_aspect(shape, rotation))))
+    size = picture_size(shape, STILL, rotation)
     picture = render_surface(
         surface.vertices,
         surface.faces,

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spem.errors import ParameterError
-from spem.plots.camera import picture_aspect
+from spem.plots.camera import picture_aspect, picture_size
 from spem.plots.fields import draw_line, draw_outline, draw_values
-from spem.plots.layout import colour_bar, curve_panels, panels
+from spem.plots.layout import curve_panels, panels, value_bar
+from spem.plots.raster import SHARPNESS
 from spem.plots.streams import mark_source
-from spem.plots.style import FIELD_CMAP, MUTED, TEXT_SIZE, bare
+from spem.plots.style import FIELD_CMAP, TEXT_SIZE, bare
 from spem.plots.surfaces import picture_surface
 from spem.plots.values import node_columns
 
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from spem.shapes.shape import Shape
-
-# Pixels of a shaded picture for each of the figure.
-SHARPNESS = 1.35
 
 
 def figure_logs(
@@ -84,7 +82,7 @@ def figure_logs(
     for ax, column, title, place in zip(axes, shown.T, titles, places, strict=True):
         _draw(shape, column, ax, (low, 0.0), place)
         bare(ax, title)
-    _scale(figure, axes[0], low)
+    value_bar(figure, axes[0], FIELD_CMAP, (low, 0.0), "log v")
     return figure
 
 
@@ -107,20 +105,10 @@ def _draw(
 ) -> None:
     """Draw one field of a silhouette or of a solid."""
     if shape.ndim == 3:
-        pixels = round(SHARPNESS * ax.bbox.width)
-        size = (pixels, max(1, round(pixels * picture_aspect(shape))))
+        size = picture_size(shape, SHARPNESS * ax.bbox.width)
         ax.imshow(picture_surface(shape, log, limits=limits, size=size), interpolation="antialiased")
         return
     draw_values(shape, log, ax, contours=True, limits=limits)
     draw_outline(shape, ax, width=0.7)
     if place is not None:
         mark_source(place, ax)
-
-
-def _scale(figure: Figure, ax: Axes, low: float) -> None:
-    """Draw the scale of log v; its least value stands below, where there is room for digits."""
-    colour_bar(figure, ax, FIELD_CMAP, (low, 0.0), ["", "0"])
-    bar = figure.axes[-1]
-    bar.set_title("log v", fontsize=TEXT_SIZE, color=MUTED, pad=7)
-    least = f"{-low:.0f}" if low < -10 else f"{-low:.1f}"
-    bar.set_xlabel(f"−{least}", fontsize=TEXT_SIZE, color=MUTED, labelpad=4)

@@ -12,9 +12,9 @@ from spem.decomposition.measurements import Centre, measurements
 from spem.fields.gradients import source_gradient, unit_vectors
 from spem.fields.sources import check_source
 from spem.fields.streamlines import even_nodes, source_streamlines
-from spem.plots.camera import Camera, picture_aspect, principal_view, view_rotation
+from spem.plots.camera import Camera, picture_aspect, picture_size, principal_view, view_rotation
 from spem.plots.fields import draw_outline, draw_values
-from spem.plots.layout import TALLEST, colour_bar, curve_panels, panels
+from spem.plots.layout import TALLEST, curve_panels, panels, value_bar
 from spem.plots.plane import require_dimension
 from spem.plots.raster import render_surface
 from spem.plots.streams import draw_contours, draw_directions, draw_streamlines, mark_source
@@ -94,7 +94,7 @@ def figure_source(
             draw_outline(shape, ax, width=0.7)
             mark_source(fields.sources.position[source], ax)
         bare(ax, title)
-    _scale(figure, axes[0], FIELD_CMAP, (low, 0.0), "log v")
+    value_bar(figure, axes[0], FIELD_CMAP, (low, 0.0), "log v")
     return figure
 
 
@@ -140,7 +140,7 @@ def figure_solid_source(
     rotation = principal_view(shape.points) if view is None else view_rotation(view)
     figure, axes = panels(2, aspect=picture_aspect(shape, rotation), bar=True)
     surface = shape_surface(shape)
-    size = (PIXELS, max(1, round(PIXELS * picture_aspect(shape, rotation))))
+    size = picture_size(shape, PIXELS, rotation)
     depth = picture_surface(shape, np.maximum(log, low), view=rotation, limits=(low, 0.0), size=size)
     axes[0].imshow(depth, interpolation="antialiased")
     picture = render_surface(surface.vertices, surface.faces, view=rotation, size=size, colour="#d5dbe3")
@@ -152,7 +152,7 @@ def figure_solid_source(
         bare(ax, title)
     x, y, _ = camera.project(fields.sources.position[[source]])[0]
     mark_source((y, x), axes[1])
-    _scale(figure, axes[0], FIELD_CMAP, (low, 0.0), "log v")
+    value_bar(figure, axes[0], FIELD_CMAP, (low, 0.0), "log v")
     return figure
 
 
@@ -194,7 +194,7 @@ def figure_measurements(fields: SourceFields, source: int) -> Figure:
         draw_outline(shape, ax, width=0.7)
         mark_source(fields.sources.position[source], ax)
         bare(ax, f"centred by the {centre}")
-    _scale(figure, axes[0], FIELD_CMAP, limits, "y")
+    value_bar(figure, axes[0], FIELD_CMAP, limits, "y")
     return figure
 
 
@@ -271,12 +271,3 @@ def _draw_frame(window: Window, ax: Axes) -> None:
     """Draw the rim of a part of the shape."""
     (top, bottom), (left, right) = window
     ax.add_patch(Rectangle((left, top), right - left, bottom - top, fill=False, color=MUTED, linewidth=0.8))
-
-
-def _scale(figure: Figure, ax: Axes, cmap: str, limits: tuple[float, float], what: str) -> None:
-    """Draw the scale with its ends above and below, where there is room for digits."""
-    colour_bar(figure, ax, cmap, limits, [""])
-    bar = figure.axes[-1]
-    above, below = (f"{end:.3g}".replace("-", "−") for end in reversed(limits))
-    bar.set_title(f"{what}\n{above}", fontsize=TEXT_SIZE, color=MUTED, pad=4)
-    bar.set_xlabel(below, fontsize=TEXT_SIZE, color=MUTED, labelpad=4)
