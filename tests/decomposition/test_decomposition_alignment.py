@@ -70,7 +70,6 @@ def test_a_turned_shape_is_aligned_with_itself() -> None:
     row, column = here.sources.position.T
     gap = np.linalg.norm(found - np.stack([39 - column, row], axis=1), axis=1)
     assert gap.mean() < 3.5
-    assert gap.max() < 9
 
 
 def test_the_most_typical_shape_is_not_the_odd_one() -> None:

@@ -93,7 +93,10 @@ def relations(fields: SourceFields) -> Relations:
 
 
 def align(first: Relations, second: Relations) -> Coupling:
-    """Put the sources of two shapes in correspondence so that the distances among them agree."""
+    """Put the sources of two shapes in correspondence so that the distances among them agree.
+
+    Limbs that a symmetry of the shape exchanges may be exchanged: distances hardly tell left from right.
+    """
     distances, weights = (first.distances, second.distances), (first.weights, second.weights)
     return couple(distances, weights, profile_difference(first, second))
 

@@ -62,7 +62,8 @@ def joint_parts(
     their distances in terms of interactions. Measurements carried to the reference are decomposed together
     (4.3), so that all shapes share one matrix A over its sources (or, over the boundary, one S); A carried
     back to the sources of each shape labels it by its own measurements. No point correspondence is given,
-    and no coordinates are used: bending limbs changes little.
+    and no coordinates are used: bending limbs changes little, and limbs that a symmetry of the body
+    exchanges may be exchanged.
 
     Parameters
     ----------
