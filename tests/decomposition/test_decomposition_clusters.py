@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from sklearn.metrics import adjusted_rand_score
@@ -11,6 +13,7 @@ from spem.decomposition.clusters import METHODS, cluster_interactions
 from spem.decomposition.measurements import centred_logs
 from spem.errors import ParameterError
 from spem.fields.operator import assemble
+from spem.fields.patches import patch_sources
 from spem.fields.source_fields import SourceFields, solve_sources
 from spem.fields.sources import point_sources
 from spem.shapes.shape import Shape
@@ -65,6 +68,18 @@ def test_order_and_seed_do_not_matter_to_the_numbers():
     centred = centred_logs(fields)
     for k in range(first.n_clusters):
         assert first.centres[k] == pytest.approx(centred[:, first.labels == k].mean(axis=1))
+
+
+def test_clusters_of_few_sources_take_no_square_of_the_nodes():
+    """Over the boundary of a shape of many nodes, memory is that of the fields."""
+    system = assemble(Shape.from_mask(np.ones((60, 60)), name="blob"))
+    fields = solve_sources(patch_sources(system, 12), np.inf)
+    tracemalloc.start()
+    clusters = cluster_interactions(fields, 3, over="boundary")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert clusters.sizes.sum() == 12
+    assert peak < 30 * fields.log.nbytes < 8 * 3600**2
 
 
 def test_fewer_distinct_vectors_give_fewer_clusters():

@@ -143,8 +143,10 @@ def _reduce(vectors: NDArray[np.float64], n_dimensions: int) -> NDArray[np.float
     if not np.ptp(filled, axis=0).any():
         return np.zeros((len(filled), 1))
     count = min(n_dimensions, *filled.shape)
-    # The covariance of a few hundred features costs far less than the vectors' own decomposition.
-    return np.asarray(PCA(count, svd_solver="covariance_eigh").fit_transform(filled))
+    # Nodes by far outnumber sources: the cost may grow with the cube of sources, never of nodes.
+    wide = filled.shape[1] > filled.shape[0]
+    solver: Literal["covariance_eigh", "full"] = "full" if wide else "covariance_eigh"
+    return np.asarray(PCA(count, svd_solver=solver).fit_transform(filled))
 
 
 def _fit(vectors: NDArray[np.float64], k: int, method: Method, seed: int) -> tuple[NDArray[np.int64], bool]:
