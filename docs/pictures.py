@@ -67,7 +67,8 @@ def main(folder: Path = FOLDER, *, share: float = 1.0) -> None:
 
 def poses(share: float = 1.0) -> Figure:
     """Draw the parts that poses of one kind share, on their own meshes."""
-    meshes = [spem.creatures.creature_mesh("dog", np.random.default_rng(seed), faces=8000) for seed in (1, 2, 5)]
+    rngs = [np.random.default_rng(seed) for seed in (1, 2, 5)]
+    meshes = [spem.creatures.creature_mesh("dog", rng, faces=8000) for rng in rngs]
     shapes = [mesh_shape(*mesh, voxels=int(20_000 * share), name="dog") for mesh in meshes]
     return figure_parts(spem.parts(shapes), meshes=meshes)
 
