@@ -90,13 +90,9 @@ def error_curve(
     Examples
     --------
     >>> import spem
-    >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
     >>> star = np.zeros((19, 19), bool)
     >>> star[8:11] = star[:, 8:11] = True
-    >>> system = assemble(spem.Shape.from_mask(star))
-    >>> error_curve(solve_sources(point_sources(system), np.inf), 10).suggested
+    >>> error_curve(spem.source_fields(spem.sources(spem.Shape.from_mask(star)), np.inf), 10).suggested
     4
     """
     if most < 1:

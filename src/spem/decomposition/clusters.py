@@ -101,13 +101,10 @@ def cluster_interactions(
 
     Examples
     --------
-    >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
-    >>> from spem.shapes.shape import Shape
+    >>> import spem
     >>> bone = np.pad(np.ones((3, 12)), ((3, 3), (0, 0)))
     >>> bone[:, :5] = bone[:, -4:] = 1
-    >>> fields = solve_sources(point_sources(assemble(Shape.from_mask(bone))), np.inf)
+    >>> fields = spem.source_fields(spem.sources(spem.Shape.from_mask(bone)), np.inf)
     >>> cluster_interactions(fields, 2)
     Clusters(2 of 90, sizes 48, 42)
     """

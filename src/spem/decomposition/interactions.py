@@ -54,11 +54,8 @@ def node_correlation(
 
     Examples
     --------
-    >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
-    >>> from spem.shapes.shape import Shape
-    >>> fields = solve_sources(point_sources(assemble(Shape.from_mask(np.ones((2, 9))))), np.inf)
+    >>> import spem
+    >>> fields = spem.source_fields(spem.sources(spem.Shape.from_mask(np.ones((2, 9)))), np.inf)
     >>> node_correlation(fields, 0, [0, 3, 8]).round(2)
     array([ 1.  ,  0.57, -0.98])
     """
@@ -100,11 +97,8 @@ def source_correlation(
 
     Examples
     --------
-    >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
-    >>> from spem.shapes.shape import Shape
-    >>> fields = solve_sources(point_sources(assemble(Shape.from_mask(np.ones(9)))), np.inf)
+    >>> import spem
+    >>> fields = spem.source_fields(spem.sources(spem.Shape.from_mask(np.ones(9))), np.inf)
     >>> source_correlation(fields, 0).round(3)
     array([ 1., -1.])
     """
@@ -150,14 +144,11 @@ def source_node_correlation(
 
     Examples
     --------
-    >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
-    >>> from spem.shapes.shape import Shape
-    >>> system = assemble(Shape.from_mask(np.ones((2, 9))))
-    >>> fields = solve_sources(point_sources(system), np.inf)
+    >>> import spem
+    >>> brick = spem.Shape.from_mask(np.ones((2, 9)))
+    >>> fields = spem.source_fields(spem.sources(brick), np.inf)
     >>> nearest = source_node_correlation(fields, 0).argmax()
-    >>> bool(np.linalg.norm(system.shape.points[nearest] - fields.sources.position[0]) < 1)
+    >>> bool(np.linalg.norm(brick.points[nearest] - fields.sources.position[0]) < 1)
     True
     """
     return _correlate(
@@ -194,11 +185,8 @@ def boundary_interactions(fields: SourceFields, sources: ArrayLike | None = None
 
     Examples
     --------
-    >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
-    >>> from spem.shapes.shape import Shape
-    >>> fields = solve_sources(point_sources(assemble(Shape.from_mask(np.ones(3)), "voxel")), np.inf)
+    >>> import spem
+    >>> fields = spem.source_fields(spem.sources(spem.Shape.from_mask(np.ones(3)), boundary="voxel"), np.inf)
     >>> np.exp(boundary_interactions(fields))
     array([[0.75, 0.25],
            [0.25, 0.75]])

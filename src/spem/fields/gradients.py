@@ -123,12 +123,9 @@ def source_gradient(fields: SourceFields, source: int) -> NDArray[np.float64]:
 
     Examples
     --------
-    >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
-    >>> from spem.shapes.shape import Shape
-    >>> sources = point_sources(assemble(Shape.from_mask(np.ones(3)), "voxel"))
-    >>> source_gradient(solve_sources(sources, np.inf), 0).round(2).ravel()
+    >>> import spem
+    >>> sources = spem.sources(spem.Shape.from_mask(np.ones(3)), boundary="voxel")
+    >>> source_gradient(spem.source_fields(sources, np.inf), 0).round(2).ravel()
     array([-0.33, -0.5 , -1.  ])
     """
     check_source(fields.sources, source)

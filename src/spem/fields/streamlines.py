@@ -134,12 +134,9 @@ def source_streamlines(
 
     Examples
     --------
-    >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
-    >>> from spem.shapes.shape import Shape
-    >>> sources = point_sources(assemble(Shape.from_mask(np.ones((3, 9))), "voxel"))
-    >>> line = source_streamlines(solve_sources(sources, np.inf), 0, [26])[0]
+    >>> import spem
+    >>> sources = spem.sources(spem.Shape.from_mask(np.ones((3, 9))), boundary="voxel")
+    >>> line = source_streamlines(spem.source_fields(sources, np.inf), 0, [26])[0]
     >>> line[0].tolist(), line[-1].tolist() == sources.position[0].tolist()
     ([2.0, 8.0], True)
     """
