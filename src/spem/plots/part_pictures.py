@@ -19,6 +19,8 @@ from spem.plots.style import INK, TEXT_SIZE, bare, part_colours
 from spem.plots.values import require_drawable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.image import AxesImage
     from matplotlib.text import Text
@@ -37,6 +39,8 @@ TONE = 0.35
 OUTLINE = 2.2
 # A number is written in a part whose inner radius in points is at least this.
 ROOM = 4.5
+# Where the room is this share of the most, a number is as readable, and may stand nearer the middle.
+WIDE = 0.85
 # How much red, green and blue count for lightness; below the second, numbers are white.
 LIGHTNESS = (0.299, 0.587, 0.114)
 DARK = 0.48
@@ -186,16 +190,22 @@ def _toned(colours: NDArray[np.float64], tone: float) -> NDArray[np.float64]:
     return np.asarray(colours + tone * (1 - colours))
 
 
+def _middle(room: NDArray[np.float64], spacing: Sequence[float]) -> NDArray[np.float64]:
+    """Return where a part is nearly as wide as anywhere, the nearest to its middle; room is 0 outside."""
+    middle = np.argwhere(room > 0).mean(axis=0) * spacing
+    wide = np.argwhere(room >= WIDE * room.max()) * np.asarray(spacing)
+    return np.asarray(wide[((wide - middle) ** 2).sum(axis=1).argmin()])
+
+
 def _number(shape: Shape, node_labels: NDArray[np.int32], ax: Axes, tone: float) -> list[Text]:
-    """Write the label of each part where it is widest, if it is wide enough; white in dark parts."""
+    """Write the label of each part where it is wide, if it is wide enough; white in dark parts."""
     points_per_unit = 72 / ax.figure.dpi * ax.bbox.width / np.ptp(ax.get_xlim())
     written = []
     for label in np.unique(node_labels[node_labels >= 0]):
         room = distance_transform_edt(shape.to_grid(node_labels == label, 0) > 0, shape.spacing)
-        row, column = np.unravel_index(int(room.argmax()), room.shape)
-        if room[row, column] * points_per_unit < ROOM:
+        if room.max() * points_per_unit < ROOM:
             continue
-        y, x = np.asarray(shape.origin) + np.array([row, column]) * np.asarray(shape.spacing)
+        y, x = np.asarray(shape.origin) + _middle(room, shape.spacing)
         light = _toned(part_colours([label]), tone)[0] @ LIGHTNESS
         ink = INK if light > DARK else "white"
         written.append(
