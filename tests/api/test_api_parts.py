@@ -58,3 +58,32 @@ def test_words_that_mean_nothing_are_refused():
     """Only the region and the boundary can be divided."""
     with pytest.raises(ParameterError, match="over='area': expected one of 'region', 'boundary'"):
         spem.parts(bone(), 2, over="area")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("rho", [[1.0, 2.0], [], -1.0, float("nan"), None])
+def test_one_rho_is_one_rho(rho):
+    """Several ρ are refused where one slice is made, not cut to the first."""
+    with pytest.raises(ParameterError, match="rho"):
+        spem.source_fields(spem.sources(bone(), 12), rho)
+    with pytest.raises(ParameterError, match="rho"):
+        spem.parts(bone(), 2, rho=rho)
+
+
+def test_a_shape_of_more_pieces_than_patches():
+    """Each separate piece of the boundary is a source at least."""
+    mask = np.ones((60, 60))
+    mask[2::4, 2::4] = 0
+    assert spem.parts(spem.Shape.from_mask(mask), 2, n_patches=100).sources.n_sources == 226
+
+
+def test_what_is_no_shape_is_refused():
+    """Arrays and paths are to be made shapes first."""
+    with pytest.raises(ParameterError, match="expected a Shape or several, got str"):
+        spem.parts(["hand.png"], 2)  # type: ignore[list-item]
+
+
+@pytest.mark.parametrize("spacing", [1e-160, 1e160])
+def test_a_spacing_beyond_floating_point_is_refused(spacing):
+    """Squares of the spacing must be numbers."""
+    with pytest.raises(ParameterError, match="use another unit of length"):
+        spem.sources(spem.Shape.from_mask(np.ones((3, 3)), spacing))

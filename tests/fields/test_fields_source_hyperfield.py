@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 import shutil
 
@@ -148,6 +149,8 @@ def test_axes_of_one_value_vanish(brick):
         ({"sources": 14}, "sources=14: expected numbers from 0 to 13"),
         ({"nodes": [0, 12]}, r"nodes=\[0, 12\]: expected numbers from 0 to 11"),
         ({"sources": 1.5}, "sources=1.5: expected numbers"),
+        ({"sources": slice("a")}, "sources=slice.*: expected numbers"),
+        ({"sources": [[0, 1], [2, 3]]}, r"sources of shape \(2, 2\): expected one number"),
     ],
 )
 def test_what_is_not_there_is_refused(brick, asked, message):
@@ -304,3 +307,60 @@ def test_reading_what_is_no_hyperfield(tmp_path):
     zarr.open_group(tmp_path / "other.zarr", mode="w")
     with pytest.raises(ReadError, match="expected a hyperfield over sources of format 1, found None"):
         SourceHyperfield.load(tmp_path / "other.zarr")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("boundary", "voxel"), ("spacing", [1.0, 7.0]), ("log", False), ("grid", [10**6, 10**6])],
+)
+def test_changed_attributes_are_damage(brick, tmp_path, key, value):
+    """What is told of a hyperfield beside its arrays is sealed with them."""
+    path = tmp_path / "brick.zarr"
+    brick.save(path)
+    about = json.loads((path / "zarr.json").read_text())
+    about["attributes"][key] = value
+    (path / "zarr.json").write_text(json.dumps(about))
+    with pytest.raises(ReadError, match=r"brick\.zarr: the hyperfield is damaged"):
+        SourceHyperfield.load(path)
+
+
+def test_attributes_that_are_none_are_no_hyperfield(brick, tmp_path):
+    """A file of another format in the place of the group's is refused."""
+    brick.save(tmp_path / "brick.zarr")
+    (tmp_path / "brick.zarr" / "zarr.json").write_text("[1, 2]")
+    with pytest.raises(ReadError, match="no hyperfield over sources there"):
+        SourceHyperfield.load(tmp_path / "brick.zarr")
+
+
+def test_one_writer_at_a_time(brick, tmp_path):
+    """A second save to one place is refused while the first goes on, and leaves it whole."""
+    path = tmp_path / "deep" / "brick.zarr"
+
+    def again(*_):
+        with pytest.raises(ParameterError, match="is being written by another process"):
+            brick.save(path)
+
+    brick.save(path, progress=again)
+    assert np.array_equal(SourceHyperfield.load(path).log(), brick.log())
+    assert [p.name for p in path.parent.iterdir()] == ["brick.zarr"]
+
+
+def test_where_nothing_can_be_written(brick, tmp_path):
+    """A file in the place of a folder is told of in one line."""
+    (tmp_path / "file").touch()
+    with pytest.raises(ParameterError, match=r"brick\.zarr: cannot be written"):
+        brick.save(tmp_path / "file" / "brick.zarr")
+
+
+def test_the_callers_rho_may_change_later(brick):
+    """The sampled ρ are the hyperfield's own."""
+    rho = np.array([1.0, 2.0])
+    hyperfield = SourceHyperfield(brick.sources, rho)
+    rho[0] = 5.0
+    assert hyperfield.rho.tolist() == [1.0, 2.0]
+
+
+def test_no_room_for_a_field(brick):
+    """The limit that is told is the one that was given, not the share of it in use."""
+    with pytest.raises(SizeError, match=r"at a time needs .*, the limit is 100 bytes"):
+        SourceHyperfield(brick.sources, [1.0], memory_limit=100)

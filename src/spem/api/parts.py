@@ -15,7 +15,6 @@ from spem.decomposition.parts import Parts
 from spem.errors import ParameterError
 from spem.fields.operator import Boundary, assemble
 from spem.fields.patches import patch_sources
-from spem.fields.rho import check_rho
 from spem.fields.source_fields import SourceFields, solve_sources
 from spem.fields.sources import Sources, point_sources
 from spem.shapes.shape import Shape
@@ -78,6 +77,8 @@ def source_fields(sources: Sources, rho: float = np.inf) -> SourceFields:
 
     Raises
     ------
+    ParameterError
+        When ρ is not one positive length.
     SizeError
         When the fields or the factorisation do not fit in memory.
 
@@ -88,7 +89,7 @@ def source_fields(sources: Sources, rho: float = np.inf) -> SourceFields:
     >>> bool((fields.log < 0).all())
     True
     """
-    return solve_sources(sources, float(check_rho(rho)[0]))
+    return solve_sources(sources, rho)
 
 
 @overload
@@ -146,8 +147,9 @@ def parts(
     sparsity
         λ of (4.3), as a share of the λ at which all codes vanish.
     n_patches
-        Patches of the boundary, one source each: as many, or every boundary point where there are no more.
-        None: every boundary point, as the paper has it for silhouettes.
+        Patches of the boundary, one source each: as many, or every boundary point where there are no more,
+        or one for each separate piece of the boundary where there are more of these. None: every boundary
+        point, as the paper has it for silhouettes.
     boundary
         Boundary model; by default the paper's, where a source is an outside voxel.
     rng
@@ -175,6 +177,10 @@ def parts(
         msg = f"over={over!r}: expected one of {', '.join(map(repr, _DIVIDE))}"
         raise ParameterError(msg)
     several = [shapes] if isinstance(shapes, Shape) else list(shapes)
+    strange = {type(shape) for shape in several} - {Shape}
+    if strange:
+        msg = f"shapes: expected a Shape or several, got {strange.pop().__name__}; make one with spem.read"
+        raise ParameterError(msg)
     fields = [
         source_fields(part_sources(shape, n_patches, boundary=boundary, rng=rng), rho) for shape in several
     ]
@@ -192,6 +198,8 @@ def part_sources(
 ) -> Sources:
     """Return the sources that a shape is divided by: patches, or every point where there are no more.
 
+    There is one patch for each separate piece of the boundary at least.
+
     Parameters
     ----------
     shape, n_patches, boundary, rng
@@ -200,4 +208,5 @@ def part_sources(
     points = sources(shape, boundary=boundary)
     if n_patches is None or n_patches >= points.n_sources:
         return points
-    return sources(shape, n_patches, boundary=boundary, rng=rng)
+    fewest = points.points.n_contours if n_patches > 0 else n_patches
+    return sources(shape, max(n_patches, fewest), boundary=boundary, rng=rng)

@@ -15,6 +15,8 @@ from spem.shapes.shape import Shape
 
 Boundary = Literal["surface", "voxel"]
 _DOMAINS = {"surface": surface_domain, "voxel": voxel_domain}
+# Weights are squares of spacings, and right-hand sides are scaled besides.
+_WIDEST = 1e100
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +80,11 @@ def assemble(shape: Shape, boundary: Boundary = "surface") -> System:
         ``"surface"``: v = 1 where the surface cuts each boundary edge (second order); ``"voxel"``: v = 1 at
         the centre of the neighbouring outside voxel, as in the paper (first order).
 
+    Raises
+    ------
+    ParameterError
+        When the boundary model is another word, or squares of the spacing leave the range of float64.
+
     Examples
     --------
     >>> import numpy as np
@@ -92,6 +99,10 @@ def assemble(shape: Shape, boundary: Boundary = "surface") -> System:
     """
     if boundary not in _DOMAINS:
         msg = f"boundary={boundary!r}: expected one of {', '.join(map(repr, _DOMAINS))}"
+        raise ParameterError(msg)
+    if not all(1 / _WIDEST <= h <= _WIDEST for h in shape.spacing):
+        span = f"{1 / _WIDEST:g} to {_WIDEST:g}"
+        msg = f"{shape.name}: spacing {shape.spacing}: expected {span}; use another unit of length"
         raise ParameterError(msg)
     domain = _DOMAINS[boundary](shape)
     weights = 1.0 / np.square(shape.spacing)

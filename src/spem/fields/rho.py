@@ -48,6 +48,26 @@ def check_rho(rho: ArrayLike) -> NDArray[np.float64]:
     return values
 
 
+def single_rho(rho: ArrayLike) -> float:
+    """Return the one ρ that is given; it must be positive, `inf` included.
+
+    Raises
+    ------
+    ParameterError
+        If there is none or are several, or it is NaN, zero or negative.
+
+    Examples
+    --------
+    >>> single_rho(2)
+    2.0
+    """
+    values = check_rho(rho)
+    if values.size != 1:
+        msg = f"rho={rho!r}: expected one length in the unit of the spacing, or inf; got {values.size}"
+        raise ParameterError(msg)
+    return float(values[0])
+
+
 def linear(low: float, high: float, count: int) -> NDArray[np.float64]:
     """Sample ρ evenly between two lengths (Fig. 2 of the paper)."""
     return np.linspace(low, high, count)

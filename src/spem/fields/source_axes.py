@@ -58,8 +58,11 @@ def numbers(count: int, wanted: ArrayLike | slice | None, what: str) -> Index:
     key = wanted if isinstance(wanted, slice) else np.asarray(wanted)
     if not isinstance(key, slice) and key.size == 0:  # an empty list is an array of floats
         return np.arange(0)
+    if not isinstance(key, slice) and key.ndim > 1:
+        msg = f"{what} of shape {key.shape}: expected one number, several in a row, or a slice"
+        raise ParameterError(msg)
     try:
         return np.asarray(np.arange(count)[key])
-    except IndexError as error:
+    except (IndexError, TypeError) as error:
         msg = f"{what}={wanted!r}: expected numbers from 0 to {count - 1} ({error})"
         raise ParameterError(msg) from error

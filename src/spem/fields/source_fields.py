@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import SizeError
+from spem.fields.rho import single_rho
 from spem.fields.solvers.protocol import SourceSolver
 from spem.fields.source_slice import prepare_slice, require_entrywise, source_solver
 from spem.fields.sources import Sources
@@ -20,7 +21,7 @@ Progress = Callable[[str, int, int], None]
 # Fields solved at a time at most: enough for the solver's matrix products, few enough for its caches.
 _BLOCK = 64
 # Right-hand sides, solutions, their transpose and the solver's own working copy.
-_COPIES = 4
+BLOCK_COPIES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +101,7 @@ def solve_sources(
     """
     require_entrywise(source_solver(solver))
     log = _solve(sources, rho, solver, memory_limit, progress, log=True)
-    return SourceFields(sources, float(rho), log)
+    return SourceFields(sources, single_rho(rho), log)
 
 
 def source_values(
@@ -181,14 +182,14 @@ def block_size(sources: Sources, held: int, memory_limit: int | None) -> int:
     """
     limit, field = memory_limit_bytes(memory_limit), 8 * sources.system.n_nodes
     room = limit // field - held
-    if room < _COPIES:
-        fit = max(limit // field - _COPIES, 0)
+    if room < BLOCK_COPIES:
+        fit = max(limit // field - BLOCK_COPIES, 0)
         name, n_nodes = sources.system.shape.name, sources.system.n_nodes
-        needed = format_size((held + _COPIES) * field)
+        needed = format_size((held + BLOCK_COPIES) * field)
         msg = (
             f"{name}: {held} fields of {n_nodes} nodes need {needed}, the limit is {format_size(limit)} and "
             f"{fit} would fit; take fewer patches or Sources.select, use a SourceHyperfield, or raise "
             "memory_limit= or SPEM_MEMORY_LIMIT"
         )
         raise SizeError(msg)
-    return int(min(_BLOCK, room // _COPIES))
+    return int(min(_BLOCK, room // BLOCK_COPIES))

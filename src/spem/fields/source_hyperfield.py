@@ -14,7 +14,7 @@ from spem.fields.rho import check_rho
 from spem.fields.solvers.protocol import SourceSolver
 from spem.fields.source_axes import Index, numbers, samples
 from spem.fields.source_blocks import Blocks, KeptBlocks, SolvedBlocks
-from spem.fields.source_fields import Progress, SourceFields, block_size
+from spem.fields.source_fields import BLOCK_COPIES, Progress, SourceFields, block_size
 from spem.fields.source_slice import source_solver
 from spem.fields.sources import Sources
 from spem.shapes.limits import format_size, memory_limit_bytes
@@ -79,9 +79,10 @@ class SourceHyperfield:
     _blocks: KeptBlocks = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        rho, quarter = check_rho(self.rho), memory_limit_bytes(self.memory_limit) // 4
+        rho, quarter = check_rho(self.rho).copy(), memory_limit_bytes(self.memory_limit) // 4
         origin = self.stored
         if origin is None:
+            self._check_room(quarter)
             few = max(_BLOCK_BYTES // (8 * self.sources.system.n_nodes), 1)
             size = min(block_size(self.sources, 0, quarter), few)
             origin = SolvedBlocks(self.sources, rho, source_solver(self.solver), size, quarter)
@@ -222,6 +223,17 @@ class SourceHyperfield:
         _, n_sources, n_nodes = self.size
         at = samples(self.rho, rho, self.shape.name)
         return at, numbers(n_sources, sources, "sources"), numbers(n_nodes, nodes, "nodes")
+
+    def _check_room(self, quarter: int) -> None:
+        """Refuse a memory limit of which a quarter holds no block of one field."""
+        needed, name = BLOCK_COPIES * 8 * self.shape.n_nodes, self.shape.name
+        if quarter < needed:
+            limit = format_size(memory_limit_bytes(self.memory_limit))
+            msg = (
+                f"{name}: to solve for one field of {self.shape.n_nodes} nodes at a time needs "
+                f"{format_size(4 * needed)}, the limit is {limit}; raise memory_limit= or SPEM_MEMORY_LIMIT"
+            )
+            raise SizeError(msg)
 
     def _check_log(self, log: bool) -> None:
         """Refuse logarithms of fields that are right only relative to their maximum."""

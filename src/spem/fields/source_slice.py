@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError
-from spem.fields.rho import check_rho
+from spem.fields.rho import single_rho
 from spem.fields.solvers.direct import Direct
 from spem.fields.solvers.protocol import Prepared, SourceSolver
 from spem.fields.source_tails import logs, scaled, solve_tails
@@ -93,12 +93,12 @@ def prepare_slice(sources: Sources, rho: float, solver: SourceSolver | None = No
     array([[0.75, 0.5 , 0.25],
            [0.25, 0.5 , 0.75]])
     """
-    length, least = check_rho(rho), _LEAST_RHO * min(sources.system.shape.spacing)
-    if length.size != 1 or length[0] < least:
-        msg = f"rho={rho}: expected one length of at least {least:g}, a millionth of the spacing, or inf"
+    length, least = single_rho(rho), _LEAST_RHO * min(sources.system.shape.spacing)
+    if length < least:
+        msg = f"rho={length:g}: expected at least {least:g}, a millionth of the spacing, or inf"
         raise ParameterError(msg)
     chosen = source_solver(solver)
-    return SourceSlice(sources, float(length[0]), chosen, chosen.prepare(sources.system, length[0] ** -2.0))
+    return SourceSlice(sources, length, chosen, chosen.prepare(sources.system, length**-2.0))
 
 
 def source_solver(solver: Any = None) -> SourceSolver:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from spem.fields.operator import assemble
 from spem.fields.source_fields import Progress
 from spem.fields.source_hyperfield import SourceHyperfield
 from spem.fields.sources import restore_sources
-from spem.fields.storage import digest, put_in_place, write_arrays
+from spem.fields.storage import digest, only_writer, put_in_place, write_arrays
 from spem.shapes.packing import pack_shape, unpack_shape
 
 FORMAT = 1
@@ -46,6 +47,8 @@ def save_source_hyperfield(
     ------
     ReadError
         If something else than a hyperfield over sources is there.
+    ParameterError
+        If it cannot be written, or someone else is writing it.
 
     Examples
     --------
@@ -62,6 +65,13 @@ def save_source_hyperfield(
     if target.exists():
         _open(target)
     draft = target.with_name(target.name + ".part")
+    with only_writer(target):
+        _write(hyperfield, draft, progress)
+        put_in_place(draft, target)
+
+
+def _write(hyperfield: SourceHyperfield, draft: Path, progress: Progress | None) -> None:
+    """Write what is still missing of a draft."""
     group = _begin(hyperfield, draft)
     fields, hashes = _array(group, _FIELDS), _array(group, _HASHES)
     size, blocks = fields.chunks[1], hyperfield.blocks
@@ -75,7 +85,6 @@ def save_source_hyperfield(
             hashes[index, block] = _hash(values)
         if progress is not None:
             progress("fields", index * n_sources + stop, n_rho * n_sources)
-    put_in_place(draft, target)
 
 
 def load_source_hyperfield(path: str | Path, memory_limit: int | None = None) -> SourceHyperfield:
@@ -90,12 +99,12 @@ def load_source_hyperfield(path: str | Path, memory_limit: int | None = None) ->
     group, attributes = _open(path)
     try:
         arrays = _head(group)
-        if digest(arrays) != attributes["sha256"]:
+        if _seal(arrays, attributes) != attributes["sha256"]:
             raise _damaged(path, "its numbers are not those that were written")
         system = assemble(unpack_shape(arrays, attributes), attributes["boundary"])
         stored = StoredBlocks(Path(path), _array(group, _FIELDS), _array(group, _HASHES), attributes["log"])
         sources = restore_sources(system, arrays["edge_source"])
-    except (KeyError, TypeError, ValueError, IndexError, RuntimeError, OSError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, RuntimeError, OSError, MemoryError) as error:
         raise _damaged(path, str(error)) from error
     return SourceHyperfield(sources, arrays["rho"], memory_limit=memory_limit, stored=stored)
 
@@ -149,7 +158,7 @@ def _open(path: str | Path) -> tuple[zarr.Group, dict[str, Any]]:
     try:
         group = zarr.open_group(path, mode="r")
         attributes = dict(group.attrs)
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         msg = f"{path}: no hyperfield over sources there ({error}); give a folder that its save wrote"
         raise ReadError(msg) from error
     if attributes.get(_MARK) != FORMAT:
@@ -165,10 +174,9 @@ def _begin(hyperfield: SourceHyperfield, draft: Path) -> zarr.Group:
     arrays, attributes = pack_shape(hyperfield.shape)
     arrays |= {"rho": hyperfield.rho, "edge_source": sources.edge_source}
     attributes |= {_MARK: FORMAT, "boundary": system.boundary, "log": hyperfield.blocks.log}
-    attributes["sha256"] = digest(arrays)
+    attributes["sha256"] = _seal(arrays, attributes)
     try:
-        _, found = _open(draft)
-        if all(found[key] == attributes[key] for key in ("sha256", "boundary", "log")):
+        if _open(draft)[1]["sha256"] == attributes["sha256"]:
             return zarr.open_group(draft, mode="r+")
     except (ReadError, KeyError):
         pass
@@ -190,6 +198,12 @@ def _begin(hyperfield: SourceHyperfield, draft: Path) -> zarr.Group:
 def _head(group: zarr.Group) -> dict[str, NDArray[Any]]:
     """Read all arrays but the fields."""
     return {name: np.asarray(a[...]) for name, a in group.arrays() if name not in (_FIELDS, _HASHES)}
+
+
+def _seal(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> str:
+    """SHA-256 of all arrays but the fields, and of the attributes."""
+    told = json.dumps({key: attributes[key] for key in sorted(attributes) if key != "sha256"})
+    return digest(arrays | {"attributes": np.frombuffer(told.encode(), np.uint8)})
 
 
 def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import zarr
 from numpy.typing import NDArray
 
-from spem.errors import ReadError
+from spem.errors import ParameterError, ReadError
 from spem.fields.hyperfield import Hyperfield
 from spem.shapes.packing import pack_shape, unpack_shape
 
@@ -36,6 +40,8 @@ def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
     ------
     ReadError
         If something else than a hyperfield is there.
+    ParameterError
+        If it cannot be written, or someone else is writing it.
 
     Examples
     --------
@@ -49,7 +55,14 @@ def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
     target = Path(path)
     if target.exists():
         load_hyperfield(target)
-    draft = target.with_name(target.name + ".part")
+    with only_writer(target):
+        draft = target.with_name(target.name + ".part")
+        _write(field, draft)
+        put_in_place(draft, target)
+
+
+def _write(field: Hyperfield, draft: Path) -> None:
+    """Write all arrays and attributes to a new group."""
     shutil.rmtree(draft, ignore_errors=True)
     group = zarr.open_group(draft, mode="w")
     shape_arrays, shape_attributes = pack_shape(field.shape)
@@ -64,7 +77,6 @@ def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
     write_arrays(group, arrays)
     own = {"spem_hyperfield": FORMAT, "boundary": field.boundary, "error": field.error}
     group.attrs.update(shape_attributes | own | {"sha256": digest(arrays)})
-    put_in_place(draft, target)
 
 
 def load_hyperfield(path: str | Path) -> Hyperfield:
@@ -78,7 +90,7 @@ def load_hyperfield(path: str | Path) -> Hyperfield:
     try:
         group = zarr.open_group(path, mode="r")
         attributes = dict(group.attrs)
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         msg = f"{path}: no hyperfield there ({error}); give a folder that Hyperfield.save wrote"
         raise ReadError(msg) from error
     if attributes.get("spem_hyperfield") != FORMAT:
@@ -92,7 +104,7 @@ def load_hyperfield(path: str | Path) -> Hyperfield:
         if digest(arrays) == attributes["sha256"]:
             return _assemble(attributes, arrays)
         reason = "its numbers are not those that were written"
-    except (KeyError, TypeError, ValueError, IndexError, RuntimeError, OSError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, RuntimeError, OSError, MemoryError) as error:
         reason = str(error)
     msg = f"{path}: the hyperfield is damaged ({reason}); write it again"
     raise ReadError(msg)
@@ -104,6 +116,44 @@ def write_arrays(group: zarr.Group, arrays: dict[str, NDArray[Any]]) -> None:
         chunks = (min(_CHUNK, max(values.shape[0], 1)), *values.shape[1:])
         group.create_array(name, shape=values.shape, dtype=values.dtype, chunks=chunks)
         group[name][...] = values  # type: ignore[index]
+
+
+@contextmanager
+def only_writer(target: Path) -> Iterator[None]:
+    """Keep others from writing to the same place meanwhile; the lock of a process that is killed falls.
+
+    Raises
+    ------
+    ParameterError
+        When someone else is writing there, or nothing can be written.
+    """
+    lock = target.with_name(f".{target.name}.lock")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with lock.open("wb") as file:
+            if not _locked(file, lock):
+                msg = f"{target}: is being written by another process; wait for it, or write elsewhere"
+                raise ParameterError(msg)
+            try:
+                yield
+            finally:
+                lock.unlink(missing_ok=True)
+    except OSError as error:
+        msg = f"{target}: cannot be written ({error}); give a place in a writable folder with room"
+        raise ParameterError(msg) from error
+
+
+def _locked(file: IO[bytes], lock: Path) -> bool:
+    """Lock a file, if nobody has; not one that its last owner has just removed."""
+    if sys.platform == "win32":
+        return True
+    import fcntl
+
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return os.path.samestat(os.fstat(file.fileno()), lock.stat())
+    except (BlockingIOError, FileNotFoundError):
+        return False
 
 
 def put_in_place(draft: Path, target: Path) -> None:
