@@ -88,12 +88,14 @@ def under_change(shapes: list[spem.Shape], settings: Sequence[Setting]) -> Itera
         mask = np.pad(shape.mask, int(2 * np.sqrt(shape.n_nodes / 10)))
         whole = labels(mask, settings)
         for name, altered in conditions(mask, np.random.default_rng(i)).items():
-            found = labels(altered, settings)
-            for setting in settings:
-                score = compared(whole[setting], found[setting], mask & altered, setting[1])
-                scores.setdefault((setting, name), []).append(score)
+            for more in (0, 2) if name == "two protrusions" else (0,):
+                found = labels(altered, [(over, k + more) for over, k in settings])
+                condition = f"{name}, k + {more}" if more else name
+                for over, k in settings:
+                    score = compared(whole[over, k], found[over, k + more], mask & altered, k)
+                    scores.setdefault(((over, k), condition), []).append(score)
     for setting in settings:
-        of_all = [several for (which, _), several in scores.items() if which == setting]
+        of_all = [s for (which, name), s in scores.items() if which == setting and "k +" not in name]
         scores[setting, "all"] = [score for several in of_all for score in several]
     for (setting, condition), several in sorted(scores.items(), key=lambda item: settings.index(item[0][0])):
         rand, adjusted, untouched = np.transpose(several)
