@@ -56,7 +56,9 @@ def test_suggestion_of_short_and_flat_curves():
 def test_bad_numbers_are_refused():
     """A curve needs at least one part, and a sparsity in range."""
     fields = solve_sources(point_sources(assemble(Shape.from_mask(np.ones((2, 4))), "voxel")), np.inf)
-    with pytest.raises(ParameterError, match="most=0: expected at least 1 part"):
+    with pytest.raises(ParameterError, match="most=0: expected a whole number of parts, at least 1"):
         error_curve(fields, 0)
+    with pytest.raises(ParameterError, match=r"most=2\.5: expected a whole number"):
+        error_curve(fields, 2.5)
     with pytest.raises(ParameterError, match="sparsity=2: expected 0 to less than 1"):
-        error_curve(fields, sparsity=2.0)
+        error_curve(fields, sparsity=2)

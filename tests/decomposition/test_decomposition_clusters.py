@@ -97,6 +97,12 @@ def test_one_node_is_one_cluster():
         assert cluster_interactions(_fields([[1]]), 1, method=method, over="boundary").sizes.sum() == 4
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_one_vector_is_one_cluster(method):
+    """A shape of one node has one cluster, whatever the method."""
+    assert cluster_interactions(_fields(np.ones((1, 1))), 1, method=method).labels.tolist() == [0]
+
+
 def test_bad_arguments_are_refused():
     """Too many clusters, none, no dimension and unknown words have their line."""
     fields = _fields(np.ones((2, 3)))

@@ -159,7 +159,9 @@ def test_bad_numbers_are_refused():
         boundary_parts(fields, 0)
     with pytest.raises(ParameterError, match=r"n_parts=2\.5: expected 1 to 6"):
         region_parts(fields, 2.5)
-    for sparsity in (1.0, -0.1, np.nan):
+    with pytest.raises(ParameterError, match="n_parts=2: expected 1 to 6"):
+        region_parts(fields, "2")
+    for sparsity in (1.0, -0.1, np.nan, None, "0.1"):
         with pytest.raises(ParameterError, match="expected 0 to less than 1, where all codes vanish"):
             region_parts(fields, 2, sparsity=sparsity)
 

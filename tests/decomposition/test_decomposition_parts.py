@@ -132,6 +132,10 @@ def test_other_files_are_refused(tmp_path):
         "parts of format 9, expected 1": {"about": np.array(later)},
         "node_labels do not fit": {"labels": arrays["labels"] + 1},
         "basis do not fit": {"basis": arrays["basis"][:, 1:]},
+        "basis are no finite numbers": {"basis": arrays["basis"] * np.nan},
+        "components are no finite numbers": {"components": arrays["components"].astype(str)},
+        "source_labels are no finite numbers": {"source_labels": arrays["source_labels"] + 0.5},
+        "rho is -1": {"rho": np.array(-1.0)},
     }
     for message, changed in damaged.items():
         np.savez(path, **(arrays | changed))

@@ -153,8 +153,11 @@ BAD = {
     "init has the shape \\(2, 5\\); expected finite atoms from 0 on, of shape \\(≤ 8, 30\\)": {
         "init": np.ones((2, 5))
     },
-    "n_init=0: expected at least 1": {"n_init": 0},
-    "max_iter=0: expected at least 1": {"max_iter": 0},
+    "sparsity='1': expected a finite": {"sparsity": "1"},
+    "n_init=0: expected a whole number, at least 1": {"n_init": 0},
+    "max_iter=0: expected a whole number, at least 1": {"max_iter": 0},
+    "max_iter=1.5: expected a whole number": {"max_iter": 1.5},
+    "tol=None: expected at least 0": {"tol": None},
     "tol=-1: expected at least 0": {"tol": -1},
 }
 
@@ -184,6 +187,32 @@ def test_bad_samples(samples, value, message):
         coder.transform(bad)
     with pytest.raises(ParameterError, match=message):
         coder.fit(bad)
+
+
+@pytest.mark.parametrize("unit", [1e-138, 1e140])
+def test_the_unit_of_the_samples_does_not_matter(samples, unit):
+    """Codes grow with the samples, as far as squares are numbers."""
+    coder = NonnegativeSparseCoding(3, 0.1, random_state=0)
+    again = NonnegativeSparseCoding(3, 0.1 * unit, random_state=0)
+    np.testing.assert_allclose(
+        again.fit_transform(samples * unit) / unit, coder.fit_transform(samples), atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("unit", [1e-200, 1e160])
+def test_samples_beyond_floating_point_are_refused(samples, unit):
+    """Where squares would vanish or overflow, the call says so."""
+    with pytest.raises(ParameterError, match="squares leave the range of float64, scale X"):
+        NonnegativeSparseCoding(3, random_state=0).fit(samples * unit)
+
+
+def test_codes_may_be_sparse(samples):
+    """Codes as a sparse matrix stand for the same samples."""
+    coder = NonnegativeSparseCoding(3, 0.1, random_state=0)
+    codes = coder.fit_transform(samples)
+    np.testing.assert_allclose(
+        coder.inverse_transform(scipy.sparse.csr_array(codes)), coder.inverse_transform(codes)
+    )
 
 
 def test_codes_of_another_size(samples):

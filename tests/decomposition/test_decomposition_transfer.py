@@ -119,6 +119,13 @@ def test_arguments_that_do_not_fit_are_refused(change, message):
         vertex_labels(shape, **arguments)
 
 
+@pytest.mark.parametrize("faces", [np.zeros((0, 3), int), [[0, 0, 0]]])
+def test_a_mesh_without_faces_or_area(faces):
+    """Vertices of no face, or of one that is a point, have no inside: they take the nearest label."""
+    cube = Shape.from_mask(np.ones((2, 2, 2)))
+    assert vertex_labels(cube, [3, 3, 3, 3, 5, 5, 5, 5], [[-0.1, 0.1, 0]], faces).tolist() == [3]
+
+
 def test_faces_of_a_plane_shape_are_refused():
     """Only shapes in space have meshes of triangles."""
     with pytest.raises(ParameterError, match="a shape of 2 dimensions"):

@@ -161,3 +161,5 @@ def test_bad_fields_are_refused():
         gradient(system, [1, 2, 3], boundary=[1, 1, 1])
     with pytest.raises(ParameterError, match="source 2, expected 0 to 1"):
         check_source(point_sources(system), 2)
+    with pytest.raises(ParameterError, match=r"source 0\.5, expected 0 to 1"):
+        check_source(point_sources(system), 0.5)

@@ -161,6 +161,8 @@ def test_bad_arguments_are_refused():
         trace_streamlines(system, np.full((9, 2), np.nan), [0])
     with pytest.raises(ParameterError, match="a seed is node 9, expected 0 to 8"):
         trace_streamlines(system, np.ones((9, 2)), [9])
+    with pytest.raises(ParameterError, match=r"numbers of nodes, \(n,\), not \(1, 2\) of float64"):
+        trace_streamlines(system, np.ones((9, 2)), [(np.nan, 0.0)])
     with pytest.raises(ParameterError, match="expected 0 < step <= 1"):
         trace_streamlines(system, np.ones((9, 2)), [0], step=0)
     with pytest.raises(ParameterError, match="a length above 0"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,8 +96,9 @@ def error_curve(
     >>> error_curve(spem.source_fields(spem.sources(spem.Shape.from_mask(star)), np.inf), 10).suggested
     4
     """
-    if most < 1:
-        msg = f"most={most}: expected at least 1 part"
+    asked: Any = most
+    if not isinstance(asked, int | np.integer) or asked < 1:
+        msg = f"most={most!r}: expected a whole number of parts, at least 1"
         raise ParameterError(msg)
     most = min(most, fields.sources.n_sources, fields.sources.system.n_nodes)
     check_division(fields, most, sparsity)

@@ -137,7 +137,7 @@ def _reduce(vectors: NDArray[np.float64], n_dimensions: int) -> NDArray[np.float
     """Project vectors on their leading principal components, unreached entries at the lowest value."""
     known = np.isfinite(vectors)
     filled = vectors if known.all() else np.where(known, vectors, vectors.min(where=known, initial=0.0))
-    if not np.ptp(filled, axis=0).any():
+    if len(filled) == 1 or not np.ptp(filled, axis=0).any():
         return np.zeros((len(filled), 1))
     count = min(n_dimensions, *filled.shape)
     # Nodes by far outnumber sources: the cost may grow with the cube of sources, never of nodes.
@@ -149,7 +149,7 @@ def _reduce(vectors: NDArray[np.float64], n_dimensions: int) -> NDArray[np.float
 def _fit(vectors: NDArray[np.float64], k: int, method: Method, seed: int) -> tuple[NDArray[np.int64], bool]:
     """Label vectors by one of the methods, and tell whether it converged."""
     limits = {"n_init": _STARTS[method], "max_iter": _MOST_ITERATIONS, "random_state": seed}
-    if method == "kmeans":
+    if method == "kmeans" or k == len(vectors) == 1:  # a mixture takes two vectors at least
         means = KMeans(k, **limits).fit(vectors)
         return np.asarray(means.labels_), bool(means.n_iter_ < _MOST_ITERATIONS)
     spread = max(float(vectors.var(axis=0).mean()), np.finfo(np.float64).tiny)

@@ -168,7 +168,7 @@ def _divide(
     return parts.relabelled(_by_size(parts))
 
 
-def check_division(fields: SourceFields, n_parts: Any, sparsity: float) -> None:
+def check_division(fields: SourceFields, n_parts: Any, sparsity: Any) -> None:
     """Refuse a number of parts or a sparsity that cannot be.
 
     Raises
@@ -183,8 +183,8 @@ def check_division(fields: SourceFields, n_parts: Any, sparsity: float) -> None:
         counts = f"{sources.n_sources} sources and {n_nodes} nodes"
         msg = f"{name}: n_parts={n_parts}: expected 1 to {most}, for it has {counts}"
         raise ParameterError(msg)
-    if not 0 <= sparsity < 1:
-        msg = f"sparsity={sparsity:g}: expected 0 to less than 1, where all codes vanish"
+    if not isinstance(sparsity, int | float | np.number) or not 0 <= sparsity < 1:
+        msg = f"sparsity={sparsity}: expected 0 to less than 1, where all codes vanish"
         raise ParameterError(msg)
 
 

@@ -144,8 +144,15 @@ def _check(parts: Parts) -> None:
         "source_labels": (m,),
         "intensity": (k,),
     }
+    if not parts.rho > 0:
+        msg = f"rho is {parts.rho:g}"
+        raise ReadError(msg)
     for name, size in expected.items():
         values = getattr(parts, name)
+        kinds = "iu" if name.endswith("labels") else "f"
+        if values.dtype.kind not in kinds or not np.isfinite(values).all():
+            msg = f"{name} are no finite numbers of their kind"
+            raise ReadError(msg)
         if values.shape != size or (name.endswith("labels") and not -1 <= values.min() <= values.max() < k):
             msg = f"{name} do not fit {k} parts, {n} nodes and {m} sources"
             raise ReadError(msg)

@@ -17,6 +17,9 @@ from spem.decomposition.coding_descent import encode
 from spem.decomposition.coding_search import RULES, Rule, Search, row_squares
 from spem.errors import ParameterError
 
+# The largest sample entry: its square must neither underflow nor, summed over all, overflow.
+_LOWEST, _HIGHEST = 1e-140, 1e150
+
 
 def largest_sparsity(X: Any) -> float:
     """Return the λ at and above which all codes of (4.3) vanish: the largest norm of a sample.
@@ -98,7 +101,7 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     tol
         Share of the objective by which five outer iterations must lower it to go on.
     random_state
-        Seed or generator of the starts.
+        Seed or `RandomState` of the starts.
 
     Attributes
     ----------
@@ -179,7 +182,8 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     def inverse_transform(self, codes: ArrayLike) -> NDArray[np.float64]:
         """Return the samples ``(n_samples, n_features)`` that codes ``(n_samples, k)`` stand for, CD."""
         check_is_fitted(self)
-        C = np.asarray(codes, np.float64)
+        given: Any = codes
+        C = np.asarray(given.toarray() if scipy.sparse.issparse(given) else given, np.float64)
         k = len(self.components_)
         if C.ndim != 2 or C.shape[1] != k:
             msg = f"codes have the shape {C.shape}; expected (n_samples, {k}), as transform returns them"
@@ -223,11 +227,16 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         """Check the parameters against the samples."""
         n, p = samples.shape
         k: Any = self.n_components
+        weight: Any = self.sparsity
         if not (isinstance(k, int | np.integer) and 1 <= k <= min(n, p)):
             msg = f"n_components={k}: expected 1 to {min(n, p)}, no more than n_samples={n} or n_features={p}"
             raise ParameterError(msg)
-        if not 0 <= self.sparsity < np.inf:
-            msg = f"sparsity={self.sparsity}: expected a finite number from 0 on"
+        if not isinstance(weight, int | float | np.number) or not 0 <= weight < np.inf:
+            msg = f"sparsity={weight!r}: expected a finite number from 0 on"
+            raise ParameterError(msg)
+        highest = float(samples.max())
+        if highest and not _LOWEST <= highest <= _HIGHEST / np.sqrt(n * p):
+            msg = f"the largest number of X is {highest:g}; squares leave the range of float64, scale X"
             raise ParameterError(msg)
         largest = largest_sparsity(samples)
         if self.sparsity > 0 and self.sparsity >= largest:
@@ -236,13 +245,14 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
                 f"expected less than {largest:.6g}, the largest norm of a sample"
             )
             raise ParameterError(msg)
-        for name, value, least in (
-            ("n_init", self.n_init, 1),
-            ("max_iter", self.max_iter, 1),
-            ("tol", self.tol, 0),
-        ):
-            if not value >= least:
-                msg = f"{name}={value}: expected at least {least}"
+        kinds: tuple[tuple[str, Any, Any, int, str], ...] = (
+            ("n_init", self.n_init, int | np.integer, 1, "a whole number, "),
+            ("max_iter", self.max_iter, int | np.integer, 1, "a whole number, "),
+            ("tol", self.tol, int | float | np.number, 0, ""),
+        )
+        for name, value, kind, least, what in kinds:
+            if not isinstance(value, kind) or not value >= least:
+                msg = f"{name}={value!r}: expected {what}at least {least}"
                 raise ParameterError(msg)
 
     def __sklearn_tags__(self) -> Any:

@@ -151,7 +151,7 @@ def _normals(surface: Surface) -> NDArray[np.float64]:
     area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     n = len(surface.vertices)
     flat = surface.faces.reshape(-1)
-    total = np.stack([np.bincount(flat, np.repeat(area[:, a], 3), n) for a in range(3)], axis=1)
+    total = np.stack([np.bincount(flat, np.repeat(area[:, a], 3), n) for a in range(3)], axis=1).astype(float)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.asarray(np.divide(total, length, out=np.zeros_like(total), where=length > 0))
 

@@ -213,7 +213,7 @@ def restore_sources(system: System, edge_source: NDArray[np.integer]) -> Sources
     return Sources(system, points, group)
 
 
-def check_source(sources: Sources, source: int) -> None:
+def check_source(sources: Sources, source: Any) -> None:
     """Raise a `ParameterError` unless the number is that of a source.
 
     Examples
@@ -222,7 +222,7 @@ def check_source(sources: Sources, source: int) -> None:
     >>> from spem.shapes.shape import Shape
     >>> check_source(point_sources(assemble(Shape.from_mask(np.ones(3)))), 1)
     """
-    if not 0 <= source < sources.n_sources:
+    if not isinstance(source, int | np.integer) or not 0 <= source < sources.n_sources:
         msg = f"{sources.system.shape.name}: source {source}, expected 0 to {sources.n_sources - 1}"
         raise ParameterError(msg)
 

@@ -195,6 +195,15 @@ def even_nodes(system: System, count: int) -> NDArray[np.int64]:
     return chosen
 
 
+def _numbers(seeds: ArrayLike, name: str) -> NDArray[np.int64]:
+    """Seeds as a row of whole numbers."""
+    numbers = np.atleast_1d(np.asarray(seeds))
+    if numbers.ndim > 1 or (numbers.size and numbers.dtype.kind not in "iu"):
+        msg = f"{name}: seeds must be the numbers of nodes, (n,), not {numbers.shape} of {numbers.dtype}"
+        raise ParameterError(msg)
+    return numbers.astype(np.int64)
+
+
 def _trace(
     system: System,
     vectors: ArrayLike,
@@ -205,7 +214,7 @@ def _trace(
 ) -> Streamlines:
     """Check the arguments, follow every line and put them into the shape's coordinates."""
     shape, domain = system.shape, system.domain
-    given, start = np.asarray(vectors, np.float64), np.atleast_1d(np.asarray(seeds, np.int64))
+    given, start = np.asarray(vectors, np.float64), _numbers(seeds, shape.name)
     if given.shape != (system.n_nodes, shape.ndim) or not np.isfinite(given).all():
         msg = f"{shape.name}: vectors must be ({system.n_nodes}, {shape.ndim}) and finite, not {given.shape}"
         raise ParameterError(msg)

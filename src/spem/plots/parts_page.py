@@ -177,8 +177,8 @@ def _body(several: Sequence[Parts], labels: NDArray[np.int32], stills: Sequence[
         stills="\n".join(stills),
         names=text(", ".join(part.shape.name for part in several)),
         boxes="\n".join(_box(i, int(label), several) for i, label in enumerate(labels)),
-        # In a script element, only this sequence could end the data.
-        data=data.replace("</", "<\\/"),
+        # In a script element, </script would end the data and <!--<script hide their end.
+        data=data.replace("<", "\\u003c"),
     )
 
 
