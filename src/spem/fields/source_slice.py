@@ -15,8 +15,9 @@ from spem.fields.solvers.protocol import Prepared, SourceSolver
 from spem.fields.source_tails import logs, scaled, solve_tails
 from spem.fields.sources import Sources
 
-# In units of the spacing: below it a field falls by more than 1e12 from node to node.
-_LEAST_RHO = 1e-6
+# In units of the spacing: below it a field falls by more than 1e4 from node to node, and means nothing there,
+# while its tails would be solved again every few dozen nodes.
+_LEAST_RHO = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +96,7 @@ def prepare_slice(sources: Sources, rho: float, solver: SourceSolver | None = No
     """
     length, least = single_rho(rho), _LEAST_RHO * min(sources.system.shape.spacing)
     if length < least:
-        msg = f"rho={length:g}: expected at least {least:g}, a millionth of the spacing, or inf"
+        msg = f"rho={length:g}: expected at least {least:g}, a hundredth of the spacing, or inf"
         raise ParameterError(msg)
     chosen = source_solver(solver)
     return SourceSlice(sources, length, chosen, chosen.prepare(sources.system, length**-2.0))
