@@ -132,6 +132,15 @@ def test_key_of_one_shape_tells_sizes():
     assert [(word[0], word[1]) for word in words] == [("0", "48"), ("1", "50"), ("none", "2")]
 
 
+def test_names_of_shapes_are_no_formulas():
+    """A file name with dollars is written as it is; titles that are given may hold formulas."""
+    shapes = [halves(4, 8, name="$x_{^$"), halves(4, 8, name="$y")]
+    figure = figure_parts(shapes)
+    figure.canvas.draw()
+    assert [ax.get_title() for ax in figure.axes[:2]] == ["$x_{^$", "$y"]
+    assert figure_parts(shapes, ["$x$", "$y$"]).axes[0].title.get_parse_math()
+
+
 def test_titles_stand_level():
     """Shapes of different proportions share panels of one height, the picture in the middle."""
     figure = figure_parts([halves(4, 12, name="wide"), halves(12, 4, name="tall")])

@@ -84,7 +84,8 @@ def figure_parts(
     for i, (part, ax) in enumerate(zip(several, axes, strict=True)):
         draw_parts(part, ax, boundary=boundary, view=view, mesh=meshes[i] if meshes else None)
         _fill_panel(ax)
-        ax.set_title(names[i] if names else "", fontsize=TITLE_SIZE, color=INK, pad=4)
+        title = ax.set_title(names[i] if names else "", fontsize=TITLE_SIZE, color=INK, pad=4)
+        title.set_parse_math(titles is not None)  # names are file names
     colour_key(figure, part_colours(labels), words)
     return figure
 
