@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray
 
 import spem
 from spem.errors import ParameterError, ReadError
@@ -112,6 +113,18 @@ def test_zarr_round_trip(tmp_path):
     assert again.shape.report == shape.report
     assert np.array_equal(again.shape.affine, np.eye(3))
     assert [p.name for p in tmp_path.iterdir()] == ["f.zarr"]
+
+
+def test_xarray_opens_the_store(tmp_path):
+    """Arrays have named dimensions, so that a store is a dataset without spem."""
+    shape = Shape.from_mask(np.ones((3, 4)), affine=np.eye(3))
+    field = spem.sweep(shape, rho=[1.0, 2.0])
+    field.save(tmp_path / "f.zarr")
+    with xarray.open_zarr(tmp_path / "f.zarr", consolidated=False) as stored:
+        assert stored["basis"].dims == ("node", "column")
+        assert stored["gram"].dims == ("term", "other_term")
+        assert np.array_equal(stored["rho"], field.rho)
+        assert dict(stored.sizes) | {"node": 12, "rho": 2, "column": field.rank} == dict(stored.sizes)
 
 
 def test_saving_never_replaces_anything_else(tmp_path):

@@ -8,6 +8,7 @@ import shutil
 
 import numpy as np
 import pytest
+import xarray
 
 from spem.errors import ParameterError, ReadError, SizeError
 from spem.fields.operator import assemble
@@ -232,6 +233,27 @@ def test_zarr_round_trip(brick, tmp_path):
         again.save(tmp_path / "f.zarr")  # over the one that it reads
         assert np.array_equal(SourceHyperfield.load(tmp_path / "f.zarr").log(), hyperfield.log())
     assert [p.name for p in tmp_path.iterdir()] == ["f.zarr"]
+
+
+def test_xarray_opens_the_store(brick, tmp_path):
+    """The stored fields are labelled by ρ, source and node without spem."""
+    brick.save(tmp_path / "f.zarr")
+    with xarray.open_zarr(tmp_path / "f.zarr", consolidated=False) as stored:
+        assert stored["fields"].dims == ("rho", "source", "node")
+        assert stored["hashes"].dims == ("rho", "block", "byte")
+        assert np.array_equal(stored["fields"].sel(rho=4.0), brick.log(4.0))
+
+
+def test_stores_without_names_of_dimensions_load(brick, tmp_path):
+    """What was written before dimensions had names is read as ever."""
+    brick.save(tmp_path / "f.zarr")
+    described = list((tmp_path / "f.zarr").glob("*/zarr.json"))
+    for file in described:
+        head = json.loads(file.read_text())
+        del head["dimension_names"]
+        file.write_text(json.dumps(head))
+    assert len(described) > 4
+    assert np.array_equal(SourceHyperfield.load(tmp_path / "f.zarr").log(), brick.log())
 
 
 def test_plain_values_are_stored_as_such(slab, tmp_path):

@@ -187,9 +187,21 @@ def _begin(hyperfield: SourceHyperfield, draft: Path) -> zarr.Group:
     size = hyperfield.blocks.size
     chunks = (1, min(size, n_sources), n_nodes)
     # logarithms of fields have too many random digits to be worth compressing
-    group.create_array(_FIELDS, shape=hyperfield.size, dtype=np.float64, chunks=chunks, compressors=None)
-    n_blocks = -(-n_sources // size)
-    group.create_array(_HASHES, shape=(n_rho, n_blocks, 32), dtype=np.uint8, chunks=(1, 1, 32))
+    group.create_array(
+        _FIELDS,
+        shape=hyperfield.size,
+        dtype=np.float64,
+        chunks=chunks,
+        compressors=None,
+        dimension_names=("rho", "source", "node"),
+    )
+    group.create_array(
+        _HASHES,
+        shape=(n_rho, -(-n_sources // size), 32),
+        dtype=np.uint8,
+        chunks=(1, 1, 32),
+        dimension_names=("rho", "block", "byte"),
+    )
     # last, so that a draft without it is known to be incomplete
     group.attrs.update(attributes)
     return group

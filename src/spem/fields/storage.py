@@ -22,6 +22,21 @@ from spem.shapes.packing import pack_shape, unpack_shape
 FORMAT = 1
 # Nodes in a chunk: about a megabyte of basis.
 _CHUNK = 32_768
+# By these names xarray opens a stored hyperfield as a dataset; it takes no name twice in an array.
+_DIMENSIONS = {
+    "voxels": ("node",),
+    "cut_voxel": ("cut",),
+    "cut_direction": ("cut",),
+    "cut_fraction": ("cut",),
+    "affine": ("affine_row", "affine_column"),
+    "basis": ("node", "column"),
+    "gram": ("term", "other_term"),
+    "mass": ("column", "other_column"),
+    "stiffness": ("column", "other_column"),
+    "source": ("column",),
+    "rho": ("rho",),
+    "edge_source": ("boundary_edge",),
+}
 
 
 def save_hyperfield(field: Hyperfield, path: str | Path) -> None:
@@ -111,10 +126,13 @@ def load_hyperfield(path: str | Path) -> Hyperfield:
 
 
 def write_arrays(group: zarr.Group, arrays: dict[str, NDArray[Any]]) -> None:
-    """Write whole arrays under their names."""
+    """Write whole arrays under their names, with those of their dimensions."""
     for name, values in arrays.items():
         chunks = (min(_CHUNK, max(values.shape[0], 1)), *values.shape[1:])
-        group.create_array(name, shape=values.shape, dtype=values.dtype, chunks=chunks)
+        dimensions = _DIMENSIONS[name]
+        group.create_array(
+            name, shape=values.shape, dtype=values.dtype, chunks=chunks, dimension_names=dimensions
+        )
         group[name][...] = values  # type: ignore[index]
 
 
