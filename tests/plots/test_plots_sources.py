@@ -52,6 +52,16 @@ def test_contours_are_where_the_values_are(ax):
     assert drawn.get_clim() == (0, 1)
 
 
+def test_contours_end_a_margin_below_the_outline(ax):
+    """Lines that cross a square end as deep as the margin; those that run along its side are left out."""
+    shape = Shape.from_mask(np.ones((20, 20)))
+    drawn = draw_contours(shape, shape.points[:, 1], ax, levels=[0.2, 9.5], margin=1)
+    (path,) = drawn.get_paths()
+    assert np.allclose(path.vertices[:, 0], 9.5)
+    assert path.vertices[:, 1].min() == 19 - path.vertices[:, 1].max() == 1
+    assert drawn.get_array().tolist() == [9.5]
+
+
 def test_contours_pass_over_unreached_components(ax):
     """Where a field is zero no line is drawn and nothing warns."""
     fields = _fields([[1, 1, 1, 1, 0, 0, 1, 1], [1, 1, 1, 1, 0, 0, 1, 1]])

@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.colors import ListedColormap
 
 from spem.errors import ParameterError
+from spem.fields.isocontours import equal_levels
 from spem.plots.camera import picture_aspect, picture_size
-from spem.plots.fields import draw_line, draw_outline, draw_values
+from spem.plots.fields import CONTOURS, draw_line, draw_outline, draw_values
 from spem.plots.layout import curve_panels, panels, value_bar
 from spem.plots.raster import SHARPNESS
-from spem.plots.streams import mark_source
+from spem.plots.streams import CLEARANCE, draw_contours, mark_source
 from spem.plots.style import FIELD_CMAP, TEXT_SIZE, bare
 from spem.plots.surfaces import picture_surface
 from spem.plots.values import node_columns
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from spem.shapes.shape import Shape
+
+_LINES = ListedColormap([(1.0, 1.0, 1.0, 0.75)])
 
 
 def figure_logs(
@@ -108,7 +112,9 @@ def _draw(
         size = picture_size(shape, SHARPNESS * ax.bbox.width)
         ax.imshow(picture_surface(shape, log, limits=limits, size=size), interpolation="antialiased")
         return
-    draw_values(shape, log, ax, contours=True, limits=limits)
+    draw_values(shape, log, ax, limits=limits)
+    levels = equal_levels(limits, CONTOURS)
+    draw_contours(shape, log, ax, levels=levels, cmap=_LINES, width=0.5, margin=CLEARANCE)
     draw_outline(shape, ax, width=0.7)
     if place is not None:
         mark_source(place, ax)

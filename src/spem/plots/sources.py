@@ -17,7 +17,7 @@ from spem.plots.fields import draw_outline, draw_values
 from spem.plots.layout import TALLEST, curve_panels, panels, value_bar
 from spem.plots.plane import require_dimension
 from spem.plots.raster import render_surface
-from spem.plots.streams import draw_contours, draw_directions, draw_streamlines, mark_source
+from spem.plots.streams import CLEARANCE, draw_contours, draw_directions, draw_streamlines, mark_source
 from spem.plots.style import COLOURS, FIELD_CMAP, MUTED, TEXT_SIZE, bare, framed
 from spem.plots.surfaces import picture_surface, shape_surface
 
@@ -82,7 +82,8 @@ def figure_source(
     low = float(log[np.isfinite(log)].min())
     figure, axes = panels(3, aspect=picture_aspect(shape), bar=True)
     draw_values(shape, np.maximum(log, low), axes[0], limits=(low, 0.0))
-    draw_contours(shape, log, axes[0], cmap="gray_r", limits=(low, low / 2), width=0.5)
+    limits = low, low / 2
+    draw_contours(shape, log, axes[0], cmap="gray_r", limits=limits, width=0.5, margin=CLEARANCE)
     draw_outline(shape, axes[1], width=0.7)
     part = window or _window(shape, log)
     draw_directions(shape, unit_vectors(slope), axes[1], window=part)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, map_coordinates
 
 from spem.errors import ParameterError
 from spem.fields.isocontours import equal_levels
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     Window = tuple[tuple[float, float], tuple[float, float]]
 
 LEVELS = 24
+# Voxels below the outline where lines of log v end: nearer, they would come and go with the cuts.
+CLEARANCE = 1.0
 # Length of an arrow, in the distance between arrows.
 ARROW = 0.8
 
@@ -43,6 +45,7 @@ def draw_contours(
     cmap: str | Colormap = FIELD_CMAP,
     limits: tuple[float, float] | None = None,
     width: float = 0.8,
+    margin: float = 0.0,
 ) -> LineCollection:
     """Draw lines of equal value on a two-dimensional shape, each in its colour, up to the outline.
 
@@ -62,6 +65,9 @@ def draw_contours(
         Values at its ends; by default the least and greatest finite value.
     width
         Of the lines, in points.
+    margin
+        Voxels below the outline where lines end. Those of log v run on along the boundary where v is 0,
+        closer than the grid can tell.
 
     Raises
     ------
@@ -87,7 +93,12 @@ def draw_contours(
     grid = extend_values(shape, np.maximum(nodal, min(low, float(steps.min()) - 1)), surface)
     # Farther out than interpolation reaches, values mean nothing.
     grid[~binary_dilation(shape.mask, np.ones((3, 3)))] = np.nan
-    traced = [(line, value) for value in steps for line in contour_lines(shape, grid, float(value))]
+    traced = [
+        (piece, value)
+        for value in steps
+        for line in contour_lines(shape, grid, float(value))
+        for piece in (_below(shape, line, surface, margin) if margin else [line])
+    ]
     drawn = LineCollection([line for line, _ in traced], cmap=cmap, linewidths=width)
     drawn.set_array(np.array([value for _, value in traced]))
     drawn.set_clim(low, high)
@@ -95,6 +106,16 @@ def draw_contours(
     clip_to(drawn, ax, contour_lines(shape, surface))
     frame(shape, ax)
     return drawn
+
+
+def _below(
+    shape: Shape, line: NDArray[np.float64], surface: NDArray[np.float64], margin: float
+) -> list[NDArray[np.float64]]:
+    """Pieces of a line (x, y) that lie deeper than a margin."""
+    index = (line[:, ::-1] - np.asarray(shape.origin)) / np.asarray(shape.spacing)
+    deep = map_coordinates(surface, index.T, order=1) > margin
+    pieces = np.split(line, np.flatnonzero(np.diff(deep)) + 1)
+    return [piece for piece in pieces[0 if deep[0] else 1 :: 2] if len(piece) > 1]
 
 
 def draw_directions(
