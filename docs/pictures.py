@@ -69,7 +69,8 @@ def poses(share: float = 1.0) -> Figure:
     """Draw the parts that poses of one kind share, on their own meshes."""
     rngs = [np.random.default_rng(seed) for seed in (1, 2, 5)]
     meshes = [spem.creatures.creature_mesh("dog", rng, faces=8000) for rng in rngs]
-    shapes = [mesh_shape(*mesh, voxels=int(20_000 * share), name="dog") for mesh in meshes]
+    voxels = int(20_000 * share)
+    shapes = [mesh_shape(*mesh, voxels=voxels, name=f"dog {i}") for i, mesh in enumerate(meshes, 1)]
     return figure_parts(spem.parts(shapes), meshes=meshes)
 
 

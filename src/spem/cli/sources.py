@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -81,7 +80,7 @@ def write_sources(
 
         columns = log.reshape(shape.n_nodes, -1)
         where = np.tile(chosen.position, (len(rho), 1))
-        write_figure(plot, figure_logs(shape, columns, _titles(rho, request.places), sources=where))
+        write_figure(plot, figure_logs(shape, columns, _titles(rho, chosen.position), sources=where))
     summary: dict[str, Any] = {"boundary": request.boundary, "rho": rho}
     summary |= {"sources": chosen.position, "distance": distance, "measure": chosen.measure}
     summary |= {"min_log": log.min(axis=0), "mean": values.mean(axis=0)}
@@ -143,6 +142,7 @@ def _tell_unreached(log: NDArray[np.float64]) -> None:
         complain(f"note: the field is 0, its logarithm -inf, at {nodes} in components that no source touches")
 
 
-def _titles(rho: NDArray[np.float64], places: Sequence[str]) -> list[str]:
+def _titles(rho: NDArray[np.float64], places: NDArray[np.float64]) -> list[str]:
     """One title for each ρ and source."""
-    return [f"ρ = {value:g}, p = ({place})" for value in rho for place in places]
+    points = [", ".join(f"{x:.4g}" for x in place) for place in places]
+    return [f"ρ = {value:g}, p = ({point})" for value in rho for point in points]
