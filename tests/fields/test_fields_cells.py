@@ -48,3 +48,17 @@ def test_as_many_cells_as_points():
     """At the limit every point is a cell."""
     points = point_sources(assemble(Shape.from_mask(np.ones((2, 2, 2))), "voxel"))
     assert np.array_equal(np.sort(equal_cells(points, np.array([24]), np.array([3]))), np.arange(24))
+
+
+@pytest.mark.parametrize(("unit", "origin"), [(10.0, (0.0, 0.0, 0.0)), (1e-3, (7.3, -1e3, 0.1))])
+def test_unit_and_origin_do_not_matter(unit, origin):
+    """Points that tie on the grid tie in millimetres and metres, wherever the grid lies."""
+    mask = np.ones((9, 12, 7))
+    mask[4:, 6:] = 0
+    spacing = (0.3, 0.7, 0.4)
+    there = Shape.from_mask(mask, tuple(unit * h for h in spacing), origin=origin)
+    cells = [
+        equal_cells(point_sources(assemble(shape)), np.array([30]), np.array([2]))
+        for shape in (Shape.from_mask(mask, spacing), there)
+    ]
+    assert np.array_equal(*cells)

@@ -20,6 +20,8 @@ _STEP = 0.25
 _EQUAL = 1.05
 _TOLERATED = 1.1
 _PASSES = 20
+# Coordinates are rounded to this share of a voxel: ties on the grid are ties in any unit of length, anywhere.
+_FINE = 4096
 
 
 def equal_cells(single: Sources, shares: NDArray[np.int64], offsets: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -54,7 +56,7 @@ def equal_cells(single: Sources, shares: NDArray[np.int64], offsets: NDArray[np.
     [0.17, 0.17, 0.17, 0.17, 0.17, 0.17]
     """
     points = single.points
-    position, measure, contour = points.position, points.measure, points.contour
+    (position, measure), contour = _in_voxels(single), points.contour
     graph = point_graph(single.system, points.edge_point)
     members = np.split(np.argsort(contour, kind="stable"), np.cumsum(np.bincount(contour))[:-1])
     start = np.concatenate(
@@ -80,6 +82,15 @@ def equal_cells(single: Sources, shares: NDArray[np.int64], offsets: NDArray[np.
             centre, start = _centroids(cell, position, measure)
     _even(graph.indptr, graph.indices, best, measure, wanted, np.bincount(best, measure))
     return best
+
+
+def _in_voxels(single: Sources) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Positions on the grid and areas of the points, in units of the smallest spacing."""
+    shape, points = single.system.shape, single.points
+    unit = min(shape.spacing)
+    position = (points.position - np.asarray(shape.origin)) / unit
+    measure = points.measure / unit ** (shape.ndim - 1)
+    return np.rint(position * _FINE) / _FINE, np.rint(measure * _FINE) / _FINE
 
 
 def _centroids(
