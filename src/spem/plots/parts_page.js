@@ -114,12 +114,13 @@ function build() {
   return { uniforms, shapes, frame: gl.createFramebuffer(), colour: gl.createRenderbuffer(), depth: gl.createRenderbuffer() };
 }
 
-// The grid of cells in which the shapes look largest.
+// The grid of cells in which the shapes look largest; three stand in a row or a column, without a gap.
 function grid() {
   const n = data.shapes.length;
   let best = { size: -1 };
   for (let columns = 1; columns <= n; columns++) {
     const rows = Math.ceil(n / columns);
+    if (n === 3 && columns === 2) continue;
     const [width, height] = [canvas.width / columns, canvas.height / rows];
     const size = Math.min(...data.shapes.map((s) => Math.min(width / s.reach[0], height / s.reach[1])));
     if (size > best.size) best = { size, columns, rows, width, height };
