@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from spem.decomposition.alignment import align, most_typical, relations, source_distances
+from spem.decomposition.alignment import (
+    align,
+    boundary_distances,
+    most_typical,
+    relations,
+    source_distances,
+)
 from spem.fields.operator import assemble
 from spem.fields.patches import patch_sources
 from spem.fields.source_fields import SourceFields, solve_sources
@@ -41,6 +48,34 @@ def test_distances_grow_along_a_strip() -> None:
     start = int(np.argmin(along))
     order = np.argsort(along)[::8]
     assert np.all(np.diff(distances[start, order]) > 0)
+
+
+def test_ways_along_a_contour_go_round_it() -> None:
+    """Around a square they are what walking past its corners takes, not the way through it."""
+    sources = _fields(np.ones((30, 30)), 40).sources
+    distances = boundary_distances(sources)
+    length = sources.measure.sum()
+    steps = np.abs(np.subtract.outer(np.arange(40), np.arange(40)))
+    assert distances == pytest.approx(np.minimum(steps, 40 - steps) * length / 40, abs=0.06 * length)
+    assert np.all(np.diag(distances) == 0)
+
+
+def test_separate_contours_are_as_far_as_can_be() -> None:
+    """From a hole to the outside there is no way along the boundary."""
+    mask = np.ones((20, 20), bool)
+    mask[8:12, 8:12] = False
+    sources = _fields(mask, 30).sources
+    distances = boundary_distances(sources)
+    apart = sources.contour[:, None] != sources.contour
+    assert apart.any()
+    assert np.all(distances[apart] == distances.max())
+
+
+def test_some_of_the_sources_may_be_left_out() -> None:
+    """Ways lead over points that belong to no source."""
+    sources = _fields(np.ones((20, 30)), 30).sources
+    all_of_them, some = boundary_distances(sources), boundary_distances(sources.select([3, 9, 20]))
+    assert some == pytest.approx(all_of_them[np.ix_([3, 9, 20], [3, 9, 20])])
 
 
 def test_sources_in_two_components_are_far_and_finite() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from spem.fields.operator import assemble
 from spem.fields.patches import patch_sources
 from spem.fields.source_fields import SourceFields, solve_sources
 from spem.fields.sources import point_sources
+from spem.shapes.read import read
 from spem.shapes.shape import Shape
 
 
@@ -99,3 +102,19 @@ def test_bad_arguments_are_refused() -> None:
         joint_parts([one], 31)
     with pytest.raises(ParameterError, match="sparsity=1"):
         joint_parts([one], 2, sparsity=1.0)
+
+
+@pytest.mark.data
+def test_fingers_keep_their_numbers(data_dir: Path) -> None:
+    """Along the contours of three left hands, five parts or more are met once, in one order."""
+    shapes = [read(data_dir / "tari1000" / f"obj11_{i}.png", inner_radius=20) for i in (7, 14, 19)]
+    fields = [solve_sources(patch_sources(assemble(shape, "voxel"), 200), np.inf) for shape in shapes]
+    met = []
+    for parts in joint_parts(fields, 8).parts:
+        labels = parts.source_labels
+        met.append(labels[np.flatnonzero(labels != np.roll(labels, 1))].tolist())
+    once = [label for label in range(8) if all(order.count(label) == 1 for order in met)]
+    orders = [[label for label in order if label in once] for order in met]
+    turned = [order[order.index(once[0]) :] + order[: order.index(once[0])] for order in orders]
+    assert len(once) >= 5
+    assert turned[0] == turned[1] == turned[2]

@@ -1,4 +1,4 @@
-"""Sources of one shape put in correspondence with those of another, by their interactions alone."""
+"""Sources of one shape put in correspondence with those of another, by how they lie to one another."""
 
 from __future__ import annotations
 
@@ -7,13 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import dijkstra
 
 from spem.decomposition.measurements import centred_logs
 from spem.decomposition.transport import Coupling, couple
+from spem.fields.boundary_points import point_graph
 from spem.fields.source_fields import SourceFields
+from spem.fields.sources import Sources
 
 # Quantiles at which the distances from one source to all others are compared.
 _QUANTILES = 40
+# Share of distances along the boundary in the square of all distances. Interactions alone exchange
+# neighbouring fingers, and distances along the boundary alone fail where limbs touch.
+_ALONG = 0.2
 
 
 def source_distances(fields: SourceFields) -> NDArray[np.float64]:
@@ -57,6 +63,35 @@ def source_distances(fields: SourceFields) -> NDArray[np.float64]:
     return np.asarray(distances)
 
 
+def boundary_distances(sources: Sources) -> NDArray[np.float64]:
+    """Return the lengths of the shortest ways between the middles of sources along the boundary.
+
+    Parameters
+    ----------
+    sources
+        Sources of one shape.
+
+    Returns
+    -------
+    distances
+        ``(n_sources, n_sources)``, symmetric, in the unit of the spacing. Sources on separate pieces of
+        boundary are as far apart as the farthest of the others.
+    """
+    points, position = sources.points, sources.points.position
+    member = np.flatnonzero(sources.group >= 0)
+    group = sources.group[member]
+    order = np.lexsort((np.linalg.norm(position[member] - sources.position[group], axis=1), group))
+    middle = member[order[np.unique(group[order], return_index=True)[1]]]
+    graph = point_graph(sources.system, points.edge_point).tocoo()
+    graph.data = np.linalg.norm(position[graph.row] - position[graph.col], axis=1)
+    # points of two boundary edges may coincide, and a way of no length would be no way
+    graph.data = np.maximum(graph.data, 1e-9 * min(sources.system.shape.spacing))
+    distances = dijkstra(graph.tocsr(), directed=False, indices=middle)[:, middle]
+    distances = (distances + distances.T) / 2
+    reached = np.isfinite(distances)
+    return np.asarray(np.where(reached, distances, distances[reached].max()))
+
+
 @dataclass(frozen=True, eq=False)
 class Relations:
     """How the sources of one shape lie to one another: what is compared between shapes.
@@ -66,7 +101,8 @@ class Relations:
     weights
         ``(n_sources,)`` share of each source in the boundary.
     distances
-        ``(n_sources, n_sources)`` distances of `source_distances`, of root mean square 1.
+        ``(n_sources, n_sources)`` distances by interactions and along the boundary together, of root mean
+        square 1.
     profiles
         ``(n_sources, n_quantiles)`` quantiles of the distances from each source to the boundary, which do not
         depend on how it is divided into sources.
@@ -81,9 +117,12 @@ def relations(fields: SourceFields) -> Relations:
     """Measure how the sources of one shape lie to one another."""
     measure = fields.sources.measure
     weights = measure / measure.sum()
-    distances = source_distances(fields)
-    scale = np.sqrt(weights @ np.square(distances) @ weights)
-    distances = distances / max(float(scale), np.finfo(float).tiny)
+    square = np.zeros((weights.size, weights.size))
+    shares = ((1 - _ALONG, source_distances(fields)), (_ALONG, boundary_distances(fields.sources)))
+    for share, distances in shares:
+        mean = float(weights @ np.square(distances) @ weights)
+        square += share * np.square(distances) / max(mean, np.finfo(float).tiny)
+    distances = np.sqrt(square)
     quantiles = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
     profiles = np.empty((weights.size, _QUANTILES))
     for i, order in enumerate(np.argsort(distances, axis=1)):
@@ -109,6 +148,10 @@ def profile_difference(first: Relations, second: Relations) -> NDArray[np.float6
 
 
 def most_typical(shapes: Sequence[Relations]) -> int:
-    """Return the shape whose sources differ least, in their profiles, from those of the others."""
-    total = [sum(float(a.weights @ profile_difference(a, b).min(axis=1)) for b in shapes) for a in shapes]
+    """Return the shape whose sources differ least, in their profiles, from the most alike of the others."""
+    total = np.zeros(len(shapes))
+    for i, a in enumerate(shapes):
+        for j, b in enumerate(shapes[:i]):
+            difference = profile_difference(a, b)
+            total[[i, j]] += a.weights @ difference.min(axis=1) + b.weights @ difference.min(axis=0)
     return int(np.argmin(total))

@@ -36,7 +36,7 @@ class JointParts:
         Which shape the sources of the others were aligned with.
     costs
         ``(n_shapes,)`` how much the interactions of each shape differ from those of the reference
-        (`spem.decomposition.transport.Coupling.cost`): below 0.01 for poses of one body at 200 sources,
+        (`spem.decomposition.transport.Coupling.cost`): below 0.02 for poses of one body at 200 sources,
         above 0.03 where bodies differ or limbs fuse in a pose.
     """
 
@@ -59,11 +59,11 @@ def joint_parts(
     """Divide several shapes into the same parts.
 
     The sources of each shape are put in correspondence with those of a reference, by a coupling that keeps
-    their distances in terms of interactions. Measurements carried to the reference are decomposed together
-    (4.3), so that all shapes share one matrix A over its sources (or, over the boundary, one S); A carried
-    back to the sources of each shape labels it by its own measurements. No point correspondence is given,
-    and no coordinates are used: bending limbs changes little, and limbs that a symmetry of the body
-    exchanges may be exchanged.
+    their distances by interactions and along the boundary. Measurements carried to the reference are
+    decomposed together (4.3), so that all shapes share one matrix A over its sources (or, over the boundary,
+    one S); A carried back to the sources of each shape labels it by its own measurements. No point
+    correspondence is given, and bending limbs changes little. Limbs that a symmetry of the body exchanges,
+    such as left and right, may be exchanged.
 
     Parameters
     ----------
