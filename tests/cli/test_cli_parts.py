@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,8 @@ from PIL import Image
 from typer.testing import Result
 
 import spem as package
+from spem.api.parts import part_sources
+from spem.cli.parts import PartsRequest
 
 Spem = Callable[..., Result]
 Refused = Callable[..., None]
@@ -90,6 +93,15 @@ def test_parts_are_those_of_the_library(spem: Spem, bone: Path, tmp_path: Path) 
     for name in ("a.npz", "b.npz"):
         found = package.Parts.load(tmp_path / name)
         np.testing.assert_array_equal(found.node_labels, expected.node_labels)
+
+
+def test_defaults_are_those_of_the_library() -> None:
+    """What the command divides by, where nothing is asked for, is what `spem.parts` divides by."""
+    known = inspect.signature(package.parts).parameters
+    request = PartsRequest()
+    for name in ("n_parts", "over", "rho", "sparsity", "n_patches", "boundary"):
+        assert getattr(request, name) == known[name].default, name
+    assert known["n_patches"].default == inspect.signature(part_sources).parameters["n_patches"].default
 
 
 def test_sources_are_patches_or_every_node(spem: Spem, tmp_path: Path) -> None:
@@ -230,10 +242,10 @@ def test_unlike_shapes_are_told(spem: Spem, clubs: list[Path], tmp_path: Path) -
 def test_several_shapes_that_do_not_fit_in_memory(
     spem: Spem, refused: Refused, clubs: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Fields of all shapes are held at once, so they must fit in memory together."""
-    monkeypatch.setenv("SPEM_MEMORY_LIMIT", "160K")
+    """Fields and measurements of all shapes are held at once, so they must fit in memory together."""
+    monkeypatch.setenv("SPEM_MEMORY_LIMIT", "300K")
     result = spem("parts", *clubs, "--patches", "40", "-o", tmp_path / "out")
-    refused(result, "the fields of 3 shapes together need", "the limit is 160 KiB")
+    refused(result, "fields and measurements of 3 shapes together need", "the limit is 300 KiB")
 
 
 @pytest.mark.parametrize(
@@ -252,6 +264,7 @@ def test_several_shapes_that_do_not_fit_in_memory(
         (("--rho", "nan"), ("--rho nan",)),
         (("--rho", "1e-200"), ("rho", "or inf")),
         (("--curve",), ("--curve makes no parts",)),
+        (("--curve", "-k", "auto"), ("-k auto: --curve suggests a number already",)),
         (("--page", "p.html"), ("bone: has 2 dimensions; --page takes shapes of 3",)),
         (("--mesh", "p.ply"), ("bone: has 2 dimensions; --mesh takes shapes of 3",)),
         (("--page", "p.txt"), ("p.txt: expected a file that ends in .html",)),
@@ -278,9 +291,15 @@ def test_wrong_requests(
 
 
 def test_nothing_to_write(spem: Spem, refused: Refused, bone: Path) -> None:
-    """`parts` without a file to write is told so before the shape is read."""
-    refused(spem("parts", "no-such-shape.png"), "nothing to write", "--page")
-    refused(spem("parts", "no-such-shape.png", "-o", "p.npz"), "no-such-shape.png: no such file")
+    """Without a file to write the parts are told, as a table or for machines."""
+    table = spem("parts", bone, "-k", "2")
+    assert table.exit_code == 0, table.stderr
+    assert [line.split()[0] for line in table.stdout.splitlines()[-2:]] == ["0", "1"]
+    assert "wrote" not in table.stdout
+    summary = json.loads(spem("parts", bone, "-k", "2", "--json").stdout)
+    assert (summary["n_parts"], summary["output"], summary["plot"]) == (2, None, None)
+    assert [path.name for path in bone.parent.iterdir()] == ["bone.png"]
+    refused(spem("parts", "no-such-shape.png"), "no-such-shape.png: no such file")
 
 
 @pytest.mark.parametrize(

@@ -105,11 +105,13 @@ def _check_count(sources: Sources, n_parts: int | None) -> None:
 
 
 def _check_memory(several: Sequence[Sources]) -> None:
-    """Refuse shapes whose fields do not fit in memory together; of a single one the solver sees to that."""
-    needed, limit = sum(8 * s.n_sources * s.system.n_nodes for s in several), memory_limit_bytes()
+    """Refuse shapes that do not fit in memory together; of a single one the solver sees to that."""
+    # a measurement for each field
+    needed, limit = sum(2 * 8 * s.n_sources * s.system.n_nodes for s in several), memory_limit_bytes()
     if len(several) > 1 and needed > limit:
         sizes = f"{format_size(needed)}, the limit is {format_size(limit)}"
-        msg = f"the fields of {len(several)} shapes together need {sizes}; take fewer shapes"
+        what = f"fields and measurements of {len(several)} shapes together"
+        msg = f"{what} need {sizes}; take fewer shapes"
         raise SizeError(msg)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spem.cli.options import (
+    PATCHES,
     Boundary,
     BoundaryChoice,
     Components,
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 
     from spem.shapes.shape import Shape
 
-PATCHES = 200
 Rho = Annotated[
     list[str] | None,
     typer.Option(
@@ -90,7 +90,7 @@ def field(
 ) -> None:
     """Compute the fields of a shape: Δv − v/ρ² = 0, v = 1 around it.
 
-    With --source or --patch, v = 1 there and 0 on the rest of the boundary.
+    With --source or --patch, v = 1 there and 0 on the rest of the boundary; the two are not mixed.
 
     The file holds points (n, d), values (n, n_rho), rho, spacing, origin of the grid, name and boundary.
     Coordinates are the shape's own: array-axis order (row, column, ...) times the spacing for images and

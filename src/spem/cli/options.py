@@ -14,6 +14,9 @@ from spem.errors import ParameterError
 if TYPE_CHECKING:
     from spem.shapes.shape import Shape
 
+# Patches of the boundary, where none are asked for.
+PATCHES = 200
+
 
 class BoundaryChoice(StrEnum):
     """Where v = 1 holds."""

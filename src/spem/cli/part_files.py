@@ -45,16 +45,13 @@ class PartFiles:
     mesh: Path | None
 
     def check(self) -> None:
-        """Make sure, before a shape is read, that there is something to write and that it can be written.
+        """Make sure, before a shape is read, that what was asked for can be written.
 
         Raises
         ------
         ParameterError
-            When there is not, or it cannot, or it would replace what is read or is not of parts.
+            When it cannot, or it would replace what is read or is not of parts.
         """
-        if not (self.output or self.plot or self.page or self.mesh):
-            msg = "nothing to write; give -o FILE.npz, --plot FILE.png, --page FILE.html or --mesh FILE.ply"
-            raise ParameterError(msg)
         if len(self.sources) > 1:
             self._check_names()
         if self.plot is not None:

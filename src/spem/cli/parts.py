@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from spem.cli.options import (
+    PATCHES,
     BoundaryChoice,
     Components,
     ComponentsChoice,
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from spem.decomposition.parts import Parts
     from spem.shapes.shape import Shape
 
-PARTS, SPARSITY, PATCHES = 8, 0.1, 200
+PARTS, SPARSITY = 8, 0.1
 AUTO, ALL = "auto", "all"
 Count = Annotated[
     str | None,
@@ -75,7 +76,10 @@ Page = Annotated[
 ]
 Mesh = Annotated[
     Path | None,
-    typer.Option(metavar="P.ply", help="Surface with labelled vertices; of several shapes, a folder."),
+    typer.Option(
+        metavar="P.ply",
+        help="Surface whose vertices have the property label; of several shapes, a folder.",
+    ),
 ]
 
 
@@ -141,6 +145,10 @@ def parts(
     Parts are numbered by size, the largest first; -1 stands for what no part explains. Several shapes are
     divided together, and a label is the same part in all; if one of them fails, nothing is written.
 
+    Sizes and intensities are printed; files are written where they are asked for. The surface of --mesh has
+    the part of each vertex as the property label, which trimesh reads into
+    metadata["_ply_raw"]["vertex"]["data"].
+
     The file holds points (n, d), labels (n,), components, basis, sources (m, d), source_labels (m,),
     intensity, rho and spacing, and what `Parts.load` needs to make parts of it again. Of a mesh the
     picture, the page and the PLY file show its own vertices and faces.
@@ -150,6 +158,7 @@ def parts(
       spem parts hand.png --inner-radius 20 -o hand.npz --plot hand-parts.png
       spem parts horse.obj -k 10 --plot horse.png --page horse.html --mesh horse-parts.ply
       spem parts horse.obj --curve
+      spem parts horse.obj -k 10 --json
       spem parts poses/*.obj -k 8 -o parts/ --plot poses.png
     """  # noqa: D301
     over: Literal["region", "boundary"] = "boundary" if boundary_parts else "region"
@@ -180,6 +189,9 @@ def parts(
 
 def _count(text: str | None, n_shapes: int, *, curve: bool) -> int | None:
     """Return the number of parts, None for the elbow; of a curve the largest, None for the default."""
+    if curve and text == AUTO:
+        msg = f"-k {AUTO}: --curve suggests a number already; leave one of them out"
+        raise ParameterError(msg)
     if n_shapes > 1 and (curve or text == AUTO):
         asked = "--curve" if curve else f"-k {AUTO}"
         msg = f"{asked}: takes one shape, got {n_shapes}; choose the number of parts by one of them"
