@@ -50,6 +50,21 @@ class ParameterError(SpemError, ValueError):
     """An argument out of its range."""
 
 
+def require_kind(value: Any, kind: type, remedy: str) -> None:
+    """Raise a `ParameterError` unless an argument is of the kind that is expected.
+
+    Examples
+    --------
+    >>> require_kind("hand.png", dict, "read it first")
+    Traceback (most recent call last):
+        ...
+    spem.errors.ParameterError: expected dict, got str; read it first
+    """
+    if not isinstance(value, kind):
+        msg = f"expected {kind.__name__}, got {type(value).__name__}; {remedy}"
+        raise ParameterError(msg)
+
+
 class LabelError(SpemError):
     """Labels that do not fit the shapes."""
 

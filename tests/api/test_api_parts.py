@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -77,9 +79,17 @@ def test_a_shape_of_more_pieces_than_patches():
 
 
 def test_what_is_no_shape_is_refused():
-    """Arrays and paths are to be made shapes first."""
-    with pytest.raises(ParameterError, match="expected a Shape or several, got str"):
+    """Arrays and paths are to be made shapes first, shapes sources, and sources fields."""
+    for call in (spem.parts, spem.sources, spem.sweep, spem.maps, lambda shape: spem.field(shape, 2.0)):
+        for what, kind in (("hand.png", "str"), (Path("hand.png"), "Path|PosixPath"), (None, "NoneType")):
+            with pytest.raises(ParameterError, match=rf"expected Shape, got ({kind}); read it first"):
+                call(what)
+    with pytest.raises(ParameterError, match="expected Shape, got str; read it first"):
         spem.parts(["hand.png"], 2)  # type: ignore[list-item]
+    with pytest.raises(ParameterError, match="expected Sources, got Shape; make them first"):
+        spem.source_fields(bone())  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="expected SourceFields, got Shape; solve for them first"):
+        spem.cluster_interactions(bone(), 2)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("spacing", [1e-160, 1e160])

@@ -95,8 +95,9 @@ def sweep(
     >>> spem.sweep(spem.synthetic.disk(radius=20.0, spacing=1.0)).rho.size
     64
     """
+    system = assemble(shape, boundary)
     samples = sample_rho(shape.size, count=n_rho, scheme=scheme) if rho is None else check_rho(rho)
-    return Sweep(rtol=rtol).hyperfield(assemble(shape, boundary), samples)
+    return Sweep(rtol=rtol).hyperfield(system, samples)
 
 
 def maps(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import overload
 
 import numpy as np
@@ -12,9 +12,9 @@ from spem.decomposition.division import SPARSITY, boundary_parts, region_parts
 from spem.decomposition.joint import joint_parts
 from spem.decomposition.measurements import Over
 from spem.decomposition.parts import Parts
-from spem.errors import ParameterError
+from spem.errors import ParameterError, require_kind
 from spem.fields.operator import Boundary, assemble
-from spem.fields.patches import patch_sources
+from spem.fields.patches import divide_points, patch_sources
 from spem.fields.source_fields import SourceFields, solve_sources
 from spem.fields.sources import Sources, point_sources
 from spem.shapes.shape import Shape
@@ -33,6 +33,9 @@ def sources(
     rng: np.random.Generator | None = None,
 ) -> Sources:
     """Divide the boundary of a shape into sources (2.2).
+
+    By default they lie on the ``"surface"``, as those of `spem.field`; `spem.parts` has the paper's, of the
+    ``"voxel"`` boundary.
 
     Parameters
     ----------
@@ -89,6 +92,7 @@ def source_fields(sources: Sources, rho: float = np.inf) -> SourceFields:
     >>> bool((fields.log < 0).all())
     True
     """
+    require_kind(sources, Sources, "make them first: spem.sources(shape)")
     return solve_sources(sources, rho)
 
 
@@ -133,6 +137,8 @@ def parts(
 ) -> Parts | list[Parts]:
     """Divide a shape into parts by non-negative sparse coding of its sources' fields (4.1, 4.3, 5.2).
 
+    By default sources are the paper's, of the ``"voxel"`` boundary, unlike those of `spem.sources`.
+
     Parameters
     ----------
     shapes
@@ -145,7 +151,8 @@ def parts(
     rho
         Screening length of the slice, in the unit of the spacing.
     sparsity
-        λ of (4.3), as a share of the λ at which all codes vanish.
+        λ of (4.3), relative: as a share of the λ at which all codes vanish. That of
+        `NonnegativeSparseCoding` is absolute.
     n_patches
         Patches of the boundary, one source each: as many, or every boundary point where there are no more,
         or one for each separate piece of the boundary where there are more of these. None: every boundary
@@ -176,11 +183,10 @@ def parts(
     if over not in _DIVIDE:
         msg = f"over={over!r}: expected one of {', '.join(map(repr, _DIVIDE))}"
         raise ParameterError(msg)
-    several = [shapes] if isinstance(shapes, Shape) else list(shapes)
-    strange = {type(shape) for shape in several} - {Shape}
-    if strange:
-        msg = f"shapes: expected a Shape or several, got {strange.pop().__name__}; make one with spem.read"
-        raise ParameterError(msg)
+    together = isinstance(shapes, Iterable) and not isinstance(shapes, str)
+    several: Sequence[Shape] = list(shapes) if together else [shapes]  # type: ignore[arg-type, list-item]
+    for shape in several:
+        require_kind(shape, Shape, "read it first: spem.read(...)")
     fields = [
         source_fields(part_sources(shape, n_patches, boundary=boundary, rng=rng), rho) for shape in several
     ]
@@ -209,4 +215,4 @@ def part_sources(
     if n_patches is None or n_patches >= points.n_sources:
         return points
     fewest = points.points.n_contours if n_patches > 0 else n_patches
-    return sources(shape, max(n_patches, fewest), boundary=boundary, rng=rng)
+    return divide_points(points, max(n_patches, fewest), rng)

@@ -14,7 +14,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.mixture import GaussianMixture
 
 from spem.decomposition.measurements import OVERS, Over, centred_logs
-from spem.errors import ParameterError
+from spem.errors import ParameterError, require_kind
 from spem.fields.source_fields import SourceFields
 
 Method = Literal["kmeans", "mixture"]
@@ -97,7 +97,7 @@ def cluster_interactions(
     Raises
     ------
     ParameterError
-        When there are fewer vectors than clusters, or an argument is out of its range.
+        When there are fewer vectors than clusters, or an argument is of another kind or out of its range.
 
     Examples
     --------
@@ -108,6 +108,7 @@ def cluster_interactions(
     >>> cluster_interactions(fields, 2)
     Clusters(2 of 90, sizes 48, 42)
     """
+    require_kind(fields, SourceFields, "solve for them first: spem.source_fields(spem.sources(shape))")
     if method not in METHODS or over not in OVERS:
         wrong = f"method={method!r}" if method not in METHODS else f"over={over!r}"
         msg = f"{wrong}: expected {' or '.join(map(repr, METHODS if method not in METHODS else OVERS))}"

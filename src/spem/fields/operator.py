@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from spem.errors import ParameterError
+from spem.errors import ParameterError, require_kind
 from spem.fields.domain import Domain, surface_domain, voxel_domain
 from spem.shapes.shape import Shape
 
@@ -83,7 +83,8 @@ def assemble(shape: Shape, boundary: Boundary = "surface") -> System:
     Raises
     ------
     ParameterError
-        When the boundary model is another word, or squares of the spacing leave the range of float64.
+        When there is no `Shape`, the boundary model is another word, or squares of the spacing leave the
+        range of float64.
 
     Examples
     --------
@@ -97,6 +98,7 @@ def assemble(shape: Shape, boundary: Boundary = "surface") -> System:
     >>> system.rhs
     array([1., 0., 1.])
     """
+    require_kind(shape, Shape, "read it first: spem.read(...)")
     if boundary not in _DOMAINS:
         msg = f"boundary={boundary!r}: expected one of {', '.join(map(repr, _DOMAINS))}"
         raise ParameterError(msg)

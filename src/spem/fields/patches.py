@@ -52,13 +52,38 @@ def patch_sources(system: System, count: int, rng: np.random.Generator | None = 
     >>> bool(patches.measure.max() / patches.measure.mean() < 1.1)
     True
     """
-    single = point_sources(system)
+    return divide_points(point_sources(system), count, rng)
+
+
+def divide_points(single: Sources, count: int, rng: np.random.Generator | None = None) -> Sources:
+    """Divide the boundary as `patch_sources` does, by its points that are known already.
+
+    Parameters
+    ----------
+    single
+        Sources of one point each, from `spem.fields.sources.point_sources`.
+    count, rng
+        As for `patch_sources`.
+
+    Raises
+    ------
+    ParameterError
+        As `patch_sources` does.
+
+    Examples
+    --------
+    >>> from spem.fields.operator import assemble
+    >>> from spem.shapes.synthetic import disk
+    >>> divide_points(point_sources(assemble(disk(1.0, 0.1))), 12).n_sources
+    12
+    """
     contour, measure = single.points.contour, single.points.measure
     _check_count(count, single)
     area = np.bincount(contour, measure).astype(np.float64)
     shares = _apportion(area, np.bincount(contour), int(count))
     offsets = np.zeros(shares.size, np.int64) if rng is None else rng.integers(np.bincount(contour))
-    group = _arcs(single, shares, offsets) if system.shape.ndim == 2 else equal_cells(single, shares, offsets)
+    divide = _arcs if single.system.shape.ndim == 2 else equal_cells
+    group = divide(single, shares, offsets)
     _, first, inverse = np.unique(group, return_index=True, return_inverse=True)
     return replace(single, group=np.argsort(np.argsort(first)).astype(np.int32)[inverse])
 
