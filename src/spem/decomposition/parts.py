@@ -24,7 +24,9 @@ class Parts:
     """Parts of one shape, of its region (4.1) or of its boundary (5.2).
 
     For the region Y ≈ A S, one column for each node; for the boundary Yᵀ ≈ A S, one column for each source.
-    Parts are numbered by size, the largest first.
+    `components` is S and `basis` Aᵀ; those of the estimator, `NonnegativeSparseCoding.components_`, are the
+    atoms, Aᵀ. Parts are numbered by size, the largest first. `spem.parts` makes them of the sources of the
+    ``"voxel"`` boundary, the paper's, where `spem.sources` and `spem.field` take ``"surface"`` by default.
 
     Parameters
     ----------
@@ -110,6 +112,9 @@ class Parts:
 
     def without_weak(self, threshold: float = 0.1) -> Parts:
         """Drop weak parts (Fig. 12); what they held goes to the strongest part left, or to none.
+
+        Over the boundary sources go by their components and nodes by the basis: the walks by which
+        `boundary_parts` gives nodes to parts take the fields, which are not kept.
 
         Parameters
         ----------

@@ -82,7 +82,9 @@ class NonnegativeSparseCoding(ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     """Few non-negative atoms of the unit ball, and sparse non-negative codes on them (4.3).
 
     Minimises ½‖X − CD‖² + λ ΣC over codes C ≥ 0 and atoms D ≥ 0 with rows of norm at most 1; with Y = Xᵀ,
-    A = Dᵀ and S = Cᵀ this is (4.3). λ = 0 is non-negative matrix factorisation.
+    A = Dᵀ and S = Cᵀ this is (4.3): `components_` are the atoms, Aᵀ, where `Parts.components` is S and
+    `Parts.basis` Aᵀ. λ is absolute here, and relative in `spem.parts`. λ = 0 is non-negative matrix
+    factorisation.
 
     Parameters
     ----------
