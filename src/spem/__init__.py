@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from spem.decomposition.choice import ErrorCurve, error_curve
     from spem.decomposition.clusters import Clusters, cluster_interactions
     from spem.decomposition.interactions import node_correlation, source_correlation, source_node_correlation
-    from spem.decomposition.joint import JointParts, joint_parts
+    from spem.decomposition.joint import joint_parts
+    from spem.decomposition.matched import MatchedParts
+    from spem.decomposition.matching import match_parts
     from spem.decomposition.parts import Parts
     from spem.decomposition.sparse_coding import NonnegativeSparseCoding
     from spem.decomposition.transfer import vertex_labels
@@ -66,9 +68,9 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "ExplicitIteration",
     "Failure",
     "Hyperfield",
-    "JointParts",
     "LabelError",
     "Maps",
+    "MatchedParts",
     "Model",
     "ModelError",
     "NonnegativeSparseCoding",
@@ -104,6 +106,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "iso_surfaces",
     "joint_parts",
     "maps",
+    "match_parts",
     "node_correlation",
     "parts",
     "precision_recall",
@@ -135,9 +138,9 @@ _HOME = {
     "ExplicitIteration": "spem.fields.solvers.explicit",
     "Failure": "spem.codes.codes",
     "Hyperfield": "spem.fields.hyperfield",
-    "JointParts": "spem.decomposition.joint",
     "LabelError": "spem.errors",
     "Maps": "spem.embedding.maps",
+    "MatchedParts": "spem.decomposition.matched",
     "Model": "spem.codes.model",
     "ModelError": "spem.errors",
     "NonnegativeSparseCoding": "spem.decomposition.sparse_coding",
@@ -173,6 +176,7 @@ _HOME = {
     "iso_surfaces": "spem.fields.isocontours",
     "joint_parts": "spem.decomposition.joint",
     "maps": "spem.api.fields",
+    "match_parts": "spem.decomposition.matching",
     "node_correlation": "spem.decomposition.interactions",
     "parts": "spem.api.parts",
     "precision_recall": "spem.retrieval.evaluation",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from spem.decomposition.alignment import align, most_typical, relations
 from spem.decomposition.coding_descent import encode
 from spem.decomposition.division import SPARSITY, check_division, limit_of, parts_of_factors
+from spem.decomposition.matched import MatchedParts
 from spem.decomposition.measurements import Centre, Over, measurements
 from spem.decomposition.parts import Parts
 from spem.decomposition.sparse_coding import NonnegativeSparseCoding, largest_sparsity
@@ -24,27 +24,6 @@ _NODES = 20_000
 _TOLERANCE = 1e-5
 
 
-@dataclass(frozen=True, eq=False)
-class JointParts:
-    """Parts of several shapes under one numbering.
-
-    Parameters
-    ----------
-    parts
-        Parts of each shape; number j means the same in all.
-    reference
-        Which shape the sources of the others were aligned with.
-    costs
-        ``(n_shapes,)`` how much the interactions of each shape differ from those of the reference
-        (`spem.decomposition.transport.Coupling.cost`): below 0.02 for poses of one body at 200 sources,
-        above 0.03 where bodies differ or limbs fuse in a pose.
-    """
-
-    parts: tuple[Parts, ...]
-    reference: int
-    costs: Array
-
-
 def joint_parts(
     fields: Sequence[SourceFields],
     n_parts: int = 8,
@@ -55,7 +34,7 @@ def joint_parts(
     reference: int | None = None,
     n_init: int = 4,
     rng: np.random.Generator | None = None,
-) -> JointParts:
+) -> MatchedParts:
     """Divide several shapes into the same parts.
 
     The sources of each shape are put in correspondence with those of a reference, by a coupling that keeps
@@ -114,10 +93,10 @@ def joint_parts(
     drawn = [rng.choice(m.shape[1], min(share, m.shape[1]), replace=False) for m in measured]
     carried = [c.to_first(m[:, i]) for c, m, i in zip(couplings, measured, drawn, strict=True)]
     samples = np.ascontiguousarray(np.hstack(carried).T if over == "region" else np.hstack(carried))
-    limit_of(samples, fields[chosen])
+    limit = limit_of(samples, fields[chosen])
     coder = NonnegativeSparseCoding(
         n_parts,
-        sparsity * largest_sparsity(samples),
+        sparsity * limit,
         n_init=n_init,
         tol=_TOLERANCE,
         random_state=int(rng.integers(2**31)),
@@ -130,7 +109,7 @@ def joint_parts(
     ]
     order = np.argsort(-np.mean([p.sizes for p in found], axis=0), kind="stable")
     costs = np.array([c.cost for c in couplings])
-    return JointParts(tuple(p.relabelled(order) for p in found), chosen, costs)
+    return MatchedParts(tuple(p.relabelled(order) for p in found), chosen, costs)
 
 
 def _own_parts(f: SourceFields, over: Over, measured: Array, on_sources: Array, sparsity: float) -> Parts:
@@ -156,14 +135,19 @@ def _check(fields: Sequence[SourceFields], n_parts: int, sparsity: float, refere
     if not fields:
         msg = "no shapes: expected the fields of one shape or several"
         raise ParameterError(msg)
+    first = fields[0].sources.system.shape
     for f in fields:
         check_division(f, n_parts, sparsity)
+        shape = f.sources.system.shape
         if f.rho != fields[0].rho:
-            names = fields[0].sources.system.shape.name, f.sources.system.shape.name
+            msg = f"{shape.name} has ρ {f.rho:g}, {first.name} has {fields[0].rho:g}: expected one ρ for all"
+            raise ParameterError(msg)
+        if shape.ndim != first.ndim:
             msg = (
-                f"{names[1]} has ρ {f.rho:g}, {names[0]} has {fields[0].rho:g}: expected one ρ for all shapes"
+                f"{shape.name} is {shape.ndim}-D, {first.name} is {first.ndim}-D: shapes of one dimension "
+                "have parts in common; divide them apart"
             )
             raise ParameterError(msg)
-    if reference is not None and not 0 <= reference < len(fields):
+    if reference is not None and reference not in range(len(fields)):
         msg = f"reference={reference}: expected the number of a shape, 0 to {len(fields) - 1}"
         raise ParameterError(msg)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse.csgraph import dijkstra
 
+from spem.decomposition.matched import MatchedParts
 from spem.decomposition.parts import Parts
 from spem.errors import ParameterError
 from spem.fields.operator import System
@@ -19,25 +20,6 @@ Array = NDArray[np.float64]
 
 # Rounds of exchanging the numbers of two parts; each lowers the cost, and few are ever needed.
 _ROUNDS = 50
-
-
-@dataclass(frozen=True, eq=False)
-class MatchedParts:
-    """Parts of several shapes under one numbering.
-
-    Parameters
-    ----------
-    parts
-        Parts of each shape; those with one number are matched, one without a match has its own.
-    reference
-        Which shape the others were matched with; its numbers are kept.
-    costs
-        ``(n_shapes,)`` mean square difference between matched parts and between their distances.
-    """
-
-    parts: tuple[Parts, ...]
-    reference: int
-    costs: Array
 
 
 @dataclass(frozen=True, eq=False)
