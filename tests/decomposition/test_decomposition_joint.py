@@ -89,14 +89,14 @@ def test_the_same_seed_gives_the_same_parts() -> None:
 
 
 def test_bad_arguments_are_refused() -> None:
-    """No shape, two ρ, two dimensions, a reference that is not there, too many parts, a sparsity at which nothing is left."""
+    """No shape, two ρ or dimensions, no such reference, too many parts, a sparsity that leaves nothing."""
     mask, _ = _walker(0.2)
     one, other = _fields(mask, 30), _fields(mask, 30, rho=9.0)
     with pytest.raises(ParameterError, match="no shapes"):
         joint_parts([], 2)
     with pytest.raises(ParameterError, match="expected one ρ for all"):
         joint_parts([one, other], 2)
-    with pytest.raises(ParameterError, match="is 3-D, .* is 2-D: shapes of one dimension"):
+    with pytest.raises(ParameterError, match=r"is 3-D, .* is 2-D: shapes of one dimension"):
         joint_parts([one, _fields(np.ones((4, 4, 4)))], 2)
     with pytest.raises(ParameterError, match="reference=2: expected the number of a shape, 0 to 1"):
         joint_parts([one, one], 2, reference=2)
