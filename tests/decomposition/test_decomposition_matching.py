@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 import spem
 from spem.decomposition.division import region_parts
-from spem.decomposition.matching import match_parts, part_graph
+from spem.decomposition.matching import match_parts
+from spem.decomposition.part_graph import part_graph
 from spem.decomposition.parts import Parts
 from spem.errors import ParameterError
 from spem.fields.operator import assemble

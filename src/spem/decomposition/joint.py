@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from spem.decomposition.alignment import align, most_typical, relations
 from spem.decomposition.coding_descent import encode
 from spem.decomposition.division import SPARSITY, check_division, limit_of, parts_of_factors
+from spem.decomposition.handedness import settle_hands
 from spem.decomposition.matched import MatchedParts
 from spem.decomposition.measurements import Centre, Over, measurements
 from spem.decomposition.parts import Parts
@@ -41,8 +42,8 @@ def joint_parts(
     their distances by interactions and along the boundary. Measurements carried to the reference are
     decomposed together (4.3), so that all shapes share one matrix A over its sources (or, over the boundary,
     one S); A carried back to the sources of each shape labels it by its own measurements. No point
-    correspondence is given, and bending limbs changes little. Limbs that a symmetry of the body exchanges,
-    such as left and right, may be exchanged.
+    correspondence is given, and bending limbs changes little. Only left and
+    right of solids, which interactions do not tell apart, are settled by where parts lie.
 
     Parameters
     ----------
@@ -109,7 +110,8 @@ def joint_parts(
     ]
     order = np.argsort(-np.mean([p.sizes for p in found], axis=0), kind="stable")
     costs = np.array([c.cost for c in couplings])
-    return MatchedParts(tuple(p.relabelled(order) for p in found), chosen, costs)
+    settled = settle_hands([p.relabelled(order) for p in found], chosen)
+    return MatchedParts(settled, chosen, costs)
 
 
 def _own_parts(f: SourceFields, over: Over, measured: Array, on_sources: Array, sparsity: float) -> Parts:

@@ -3,40 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
-from scipy.sparse.csgraph import dijkstra
 
+from spem.decomposition.handedness import settle_hands
 from spem.decomposition.matched import MatchedParts
+from spem.decomposition.part_graph import PartGraph, part_graph
 from spem.decomposition.parts import Parts
 from spem.errors import ParameterError
-from spem.fields.operator import System
 
 Array = NDArray[np.float64]
 
 # Rounds of exchanging the numbers of two parts; each lowers the cost, and few are ever needed.
 _ROUNDS = 50
-
-
-@dataclass(frozen=True, eq=False)
-class PartGraph:
-    """What the parts of one shape are, whatever their numbers.
-
-    Parameters
-    ----------
-    traits
-        ``(k, n_traits)`` square root of the share in the nodes, and the mean features.
-    distances
-        ``(k, k)`` mean distances inside the shape from the nodes of one part to the other part, in units of
-        the shape's size; on the diagonal, from the nodes of a part to the rest of the shape.
-    """
-
-    traits: Array
-    distances: Array
 
 
 def match_parts(
@@ -45,8 +26,8 @@ def match_parts(
     """Give like parts of several shapes like numbers.
 
     Parts are alike when their sizes and mean features are, and when they lie to one another alike: at like
-    distances inside the shape. Each shape is matched with the reference by assignment on both, and parts
-    that a symmetry of the shape exchanges may be exchanged.
+    distances inside the shape. Each shape is matched with the reference by assignment on both, then left
+    and right of solids are settled by where parts lie.
 
     Parameters
     ----------
@@ -87,54 +68,7 @@ def match_parts(
     n_numbers = max(p.n_parts for p in parts)
     matches, costs = zip(*solved[chosen], strict=True)
     found = [p.relabelled(_order(m, p.n_parts, n_numbers)) for p, m in zip(parts, matches, strict=True)]
-    return MatchedParts(tuple(found), chosen, np.array(costs))
-
-
-def part_graph(parts: Parts, features: Array | None = None) -> PartGraph:
-    """Measure the parts of one shape and how they lie to one another.
-
-    Parameters
-    ----------
-    parts
-        The parts.
-    features
-        ``(n_nodes, n_features)`` values whose means over each part describe it.
-
-    Examples
-    --------
-    >>> import spem
-    >>> bar = spem.Shape.from_mask(np.ones((4, 40)))
-    >>> part_graph(spem.parts(bar, 2)).traits.round(2).tolist()
-    [[0.71], [0.71]]
-    """
-    k, labels = parts.n_parts, parts.node_labels
-    member = (labels == np.arange(k)[:, None]).astype(np.float64)
-    count = np.maximum(member.sum(axis=1), 1.0)
-    values = np.empty((labels.size, 0)) if features is None else np.asarray(features, np.float64)
-    traits = np.column_stack([np.sqrt(parts.sizes), member @ values / count[:, None]])
-    graph = _node_graph(parts.sources.system)
-    reach = np.stack([_distance_to(graph, labels == j) for j in range(k)])
-    distances = np.asarray(reach @ member.T) / count
-    outside = np.stack([_distance_to(graph, labels != j) for j in range(k)])
-    distances[np.diag_indices(k)] = np.sum(outside * member, axis=1) / count
-    return PartGraph(traits, (distances + distances.T) / (2 * parts.shape.size))
-
-
-def _node_graph(system: System) -> scipy.sparse.csr_array:
-    """Inside nodes joined to their neighbours, at their distance."""
-    neighbours, n = system.domain.neighbours, system.n_nodes
-    node, direction = np.nonzero(neighbours < n)
-    length = np.asarray(system.shape.spacing)[direction // 2]
-    return scipy.sparse.csr_array((length, (node, neighbours[node, direction])), shape=(n, n))
-
-
-def _distance_to(graph: scipy.sparse.csr_array, members: NDArray[np.bool_]) -> Array:
-    """Distance from every node to the nearest of some; where there is no way, the largest distance."""
-    if not members.any():
-        return np.zeros(members.size)
-    distance = dijkstra(graph, indices=np.flatnonzero(members), min_only=True)
-    reached = np.isfinite(distance)
-    return np.asarray(np.where(reached, distance, distance[reached].max()))
+    return MatchedParts(settle_hands(found, chosen), chosen, np.array(costs))
 
 
 def _on_one_scale(graphs: Sequence[PartGraph]) -> list[PartGraph]:
