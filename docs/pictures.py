@@ -27,14 +27,14 @@ def main(folder: Path = FOLDER, *, share: float = 1.0) -> None:
     """Draw every picture, of shapes with this share of their voxels."""
     folder.mkdir(exist_ok=True)
 
-    def save(figure: Figure, name: str) -> None:
+    def save(figure: Figure, name: str, *, palette: bool = True) -> None:
         FigureCanvasAgg(figure)
         target = BytesIO()
         figure.savefig(target, dpi=110)
-        # A palette makes the files a third as large.
-        Image.open(target).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(
-            folder / name, optimize=True
-        )
+        picture = Image.open(target).convert("RGB")
+        # A palette makes the files a third as large; it has no place for a colour that few pixels have.
+        written = picture.quantize(256, dither=Image.Dither.NONE) if palette else picture
+        written.save(folder / name, optimize=True)
 
     flat = spem.creatures.creature("hand", voxels=int(9_000 * share), rng=np.random.default_rng(4))
     flat = replace(flat, spacing=(1.0, 1.0), origin=(0.0, 0.0))  # lengths in pixels, as of an image
@@ -59,7 +59,7 @@ def main(folder: Path = FOLDER, *, share: float = 1.0) -> None:
 
     every = spem.sources(flat).position
     tip = spem.sources(flat, at=every[np.argmin(every[:, 0])])
-    save(figure_source(spem.source_fields(tip), 0), "source.png")
+    save(figure_source(spem.source_fields(tip), 0), "source.png", palette=False)
     divisions = [spem.parts(flat), spem.parts(flat, over="boundary")]
     save(figure_parts(divisions, ["of the region", "of the boundary"]), "parts.png")
     save(poses(share), "parts-3d.png")
@@ -71,7 +71,7 @@ def poses(share: float = 1.0) -> Figure:
     meshes = [spem.creatures.creature_mesh("dog", rng, faces=8000) for rng in rngs]
     voxels = int(20_000 * share)
     shapes = [mesh_shape(*mesh, voxels=voxels, name=f"dog {i}") for i, mesh in enumerate(meshes, 1)]
-    return figure_parts(spem.parts(shapes), meshes=meshes)
+    return figure_parts(spem.parts(shapes, 9), meshes=meshes)
 
 
 def answers(share: float = 1.0) -> Figure:

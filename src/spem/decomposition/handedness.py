@@ -56,7 +56,7 @@ def _pairs(parts: Parts) -> list[tuple[int, int]]:
         rest = np.setdiff1d(np.arange(k), (i, j))
         if not rest.size or abs(root[i] - root[j]) > _SIZES * max(root[i], root[j]):
             continue
-        both = graph.distances[np.ix_([i, j], rest)]
+        both = graph.distances[[i, j]][:, rest]
         difference = np.sqrt(np.mean(np.square(both[0] - both[1])) / np.mean(np.square(both)))
         if difference <= _DISTANCES:
             found.append((float(difference), i, j))
