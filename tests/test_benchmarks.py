@@ -13,7 +13,16 @@ import pytest
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 KEYS = {"benchmark", "quick", "machine", "facts", "tables", "targets", "skipped"}
-WITHOUT_DATA = ("convergence", "source_accuracy", "startup", "sweep_accuracy", "sweep_scaling")
+WITHOUT_DATA = (
+    "convergence",
+    "parts_silhouettes",
+    "patches",
+    "source_accuracy",
+    "source_speed",
+    "startup",
+    "sweep_accuracy",
+    "sweep_scaling",
+)
 
 
 def _run(name: str, out: Path, **environment: str) -> dict:
@@ -50,6 +59,15 @@ def test_collections_are_skipped_without_data(tmp_path):
     assert result["tables"] == {}
     assert result["targets"] == []
     assert [reason.split(":")[0] for reason in result["skipped"]] == ["tari1000", "shrec11"]
+
+
+@pytest.mark.parametrize("name", ["pose_consistency", "sparse_coding"])
+def test_real_shapes_are_skipped_without_data(name, tmp_path):
+    """Without the shapes that a benchmark is of there is no figure, only the reasons."""
+    result = _run(name, tmp_path, SPEM_DATA=str(tmp_path / "absent"))
+    assert result["tables"] == {}
+    assert result["targets"] == []
+    assert result["skipped"]
 
 
 @pytest.mark.skipif(importlib.util.find_spec("pyamg") is None, reason="pyamg is not installed")
