@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         SizeError,
         SpemError,
     )
+    from spem.fields.boundary.sources import Sources
     from spem.fields.gradients import source_gradient
     from spem.fields.hyperfield import Hyperfield
     from spem.fields.isocontours import iso_contours, iso_surfaces
@@ -42,10 +43,9 @@ if TYPE_CHECKING:
     from spem.fields.solvers.explicit import ExplicitIteration
     from spem.fields.solvers.protocol import Solution
     from spem.fields.solvers.sweep import Sweep
-    from spem.fields.source_fields import SourceFields
-    from spem.fields.source_hyperfield import SourceHyperfield
-    from spem.fields.sources import Sources
     from spem.fields.streamlines import Streamlines, source_streamlines
+    from spem.fields.superposition.fields import SourceFields
+    from spem.fields.superposition.hyperfield import SourceHyperfield
     from spem.retrieval.distances import correlation_distance, fuse
     from spem.retrieval.evaluation import PrecisionRecall, Scores, bulls_eye, precision_recall
     from spem.retrieval.ranking import Answer
@@ -155,9 +155,9 @@ _HOME = {
     "ShapeError": "spem.errors",
     "SizeError": "spem.errors",
     "Solution": "spem.fields.solvers.protocol",
-    "SourceFields": "spem.fields.source_fields",
-    "SourceHyperfield": "spem.fields.source_hyperfield",
-    "Sources": "spem.fields.sources",
+    "SourceFields": "spem.fields.superposition.fields",
+    "SourceHyperfield": "spem.fields.superposition.hyperfield",
+    "Sources": "spem.fields.boundary.sources",
     "SpemError": "spem.errors",
     "Streamlines": "spem.fields.streamlines",
     "Sweep": "spem.fields.solvers.sweep",

@@ -12,10 +12,10 @@ from spem.decomposition.alignment import (
     relations,
     source_distances,
 )
+from spem.fields.boundary.patches import patch_sources
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.patches import patch_sources
-from spem.fields.source_fields import SourceFields, solve_sources
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import SourceFields, solve_sources
 from spem.shapes.shape import Shape
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from spem.decomposition.choice import ErrorCurve, error_curve
 from spem.errors import ParameterError
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.source_fields import SourceFields, solve_sources
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import SourceFields, solve_sources
 from spem.shapes.shape import Shape
 
 

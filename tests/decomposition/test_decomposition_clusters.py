@@ -12,10 +12,10 @@ import spem
 from spem.decomposition.clusters import METHODS, cluster_interactions
 from spem.decomposition.measurements import centred_logs
 from spem.errors import ParameterError
+from spem.fields.boundary.patches import patch_sources
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.patches import patch_sources
-from spem.fields.source_fields import SourceFields, solve_sources
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import SourceFields, solve_sources
 from spem.shapes.shape import Shape
 
 

@@ -13,10 +13,10 @@ import spem
 from spem.decomposition.division import boundary_parts, parts_of_factors, region_parts
 from spem.decomposition.measurements import measurements
 from spem.errors import ParameterError
+from spem.fields.boundary.patches import patch_sources
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.patches import patch_sources
-from spem.fields.source_fields import SourceFields, solve_sources
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import SourceFields, solve_sources
 from spem.shapes.shape import Shape
 
 BOTH = pytest.mark.parametrize("divide", [region_parts, boundary_parts])

@@ -9,8 +9,8 @@ import pytest
 
 from spem.decomposition.handedness import settle_hands
 from spem.decomposition.parts import Parts
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.sources import point_sources
 from spem.shapes.shape import Shape
 
 TRUNK, HEAD, FRONT_LEFT, FRONT_RIGHT, HIND_LEFT, HIND_RIGHT = range(6)

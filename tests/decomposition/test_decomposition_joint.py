@@ -9,10 +9,10 @@ import pytest
 
 from spem.decomposition.joint import joint_parts
 from spem.errors import ParameterError
+from spem.fields.boundary.patches import patch_sources
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.patches import patch_sources
-from spem.fields.source_fields import SourceFields, solve_sources
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import SourceFields, solve_sources
 from spem.shapes.read import read
 from spem.shapes.shape import Shape
 

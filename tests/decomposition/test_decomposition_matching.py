@@ -13,9 +13,9 @@ from spem.decomposition.matching import match_parts
 from spem.decomposition.part_graph import part_graph
 from spem.decomposition.parts import Parts
 from spem.errors import ParameterError
+from spem.fields.boundary.patches import patch_sources
 from spem.fields.operator import assemble
-from spem.fields.patches import patch_sources
-from spem.fields.source_fields import solve_sources
+from spem.fields.superposition.fields import solve_sources
 from spem.shapes.shape import Shape
 
 

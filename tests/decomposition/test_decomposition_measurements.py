@@ -10,9 +10,9 @@ from hypothesis.extra.numpy import arrays
 
 from spem.decomposition.measurements import centred_logs, measurements
 from spem.errors import ParameterError
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.source_fields import SourceFields, solve_sources
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import SourceFields, solve_sources
 from spem.shapes.shape import Shape
 
 

@@ -11,10 +11,10 @@ import spem
 from spem.decomposition.division import boundary_parts, region_parts
 from spem.decomposition.parts import Parts, touched_part
 from spem.errors import ParameterError, ReadError
+from spem.fields.boundary.patches import patch_sources
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.patches import patch_sources
-from spem.fields.source_fields import solve_sources
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import solve_sources
 from spem.shapes.shape import Cuts, Shape
 
 ARRAYS = ("components", "basis", "node_labels", "source_labels", "intensity")

@@ -13,9 +13,9 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 import spem
 from spem.decomposition.sparse_coding import NonnegativeSparseCoding, fit_counts, largest_sparsity
 from spem.errors import ParameterError
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.source_fields import solve_sources
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import solve_sources
 
 
 @parametrize_with_checks([NonnegativeSparseCoding(2, n_init=1, random_state=0)])

@@ -10,10 +10,10 @@ from scipy.special import ive
 
 import spem
 from spem.errors import ParameterError
+from spem.fields.boundary.sources import check_source, point_sources
 from spem.fields.gradients import gradient, log_gradient, source_gradient, unit_vectors
 from spem.fields.operator import assemble
-from spem.fields.source_fields import solve_sources
-from spem.fields.sources import check_source, point_sources
+from spem.fields.superposition.fields import solve_sources
 from spem.shapes.shape import Cuts, Shape
 from spem.shapes.synthetic import ball, disk
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from spem.errors import ParameterError, ShapeError
+from spem.fields.boundary.sources import point_sources
 from spem.fields.isocontours import equal_levels, iso_contours, iso_surfaces
 from spem.fields.operator import assemble
-from spem.fields.source_fields import solve_sources
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import solve_sources
 from spem.shapes.shape import Shape
 from spem.shapes.synthetic import ball, disk
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 import spem
 from spem.errors import ParameterError
+from spem.fields.boundary.sources import point_sources
 from spem.fields.gradients import gradient, source_gradient
 from spem.fields.operator import assemble
-from spem.fields.source_fields import solve_sources
-from spem.fields.sources import point_sources
 from spem.fields.streamlines import even_nodes, source_streamlines, trace_streamlines
+from spem.fields.superposition.fields import solve_sources
 from spem.shapes.shape import Cuts, Shape
 from spem.shapes.synthetic import annulus, ball, disk
 

@@ -10,8 +10,8 @@ from matplotlib.colors import to_rgba
 
 from spem.decomposition.parts import Parts
 from spem.errors import ParameterError, ShapeError
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.sources import point_sources
 from spem.plots.boundary_lines import draw_boundary
 from spem.plots.layout import colour_key, panels
 from spem.plots.part_components import figure_components

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from PIL import Image
 
 from spem.errors import ParameterError, ShapeError
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.source_fields import SourceFields, solve_sources
-from spem.fields.sources import point_sources
 from spem.fields.streamlines import source_streamlines
+from spem.fields.superposition.fields import SourceFields, solve_sources
 from spem.plots.sources import (
     figure_measurements,
     figure_solid_source,

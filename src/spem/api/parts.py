@@ -13,10 +13,10 @@ from spem.decomposition.joint import joint_parts
 from spem.decomposition.measurements import Over
 from spem.decomposition.parts import Parts
 from spem.errors import ParameterError, require_kind
+from spem.fields.boundary.patches import divide_points, patch_sources
+from spem.fields.boundary.sources import Sources, point_sources
 from spem.fields.operator import Boundary, assemble
-from spem.fields.patches import divide_points, patch_sources
-from spem.fields.source_fields import SourceFields, solve_sources
-from spem.fields.sources import Sources, point_sources
+from spem.fields.superposition.fields import SourceFields, solve_sources
 from spem.shapes.shape import Shape
 
 # Enough to tell fingers apart; more, up to every boundary point, make parts no steadier.
@@ -49,7 +49,7 @@ def sources(
         ``"surface"``: boundary points are where the surface cuts an edge; ``"voxel"``: the outside voxels
         next to the shape, as in the paper.
     rng
-        Where the patches begin; see `spem.fields.patches.patch_sources`.
+        Where the patches begin; see `spem.fields.boundary.patches.patch_sources`.
 
     Raises
     ------

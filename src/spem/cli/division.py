@@ -17,8 +17,8 @@ from spem.decomposition.division import boundary_parts, region_parts
 from spem.decomposition.joint import joint_parts
 from spem.decomposition.parts import Parts
 from spem.errors import ParameterError, SizeError
-from spem.fields.source_fields import SourceFields, solve_sources
-from spem.fields.sources import Sources
+from spem.fields.boundary.sources import Sources
+from spem.fields.superposition.fields import SourceFields, solve_sources
 from spem.shapes.limits import format_size, memory_limit_bytes
 
 if TYPE_CHECKING:

@@ -16,9 +16,9 @@ from spem.cli.output import complain, counted, write_figure, write_npz
 from spem.cli.progress import Bar
 from spem.cli.results import about, summarise
 from spem.errors import ParameterError
+from spem.fields.boundary.sources import Sources
 from spem.fields.operator import Boundary
-from spem.fields.source_fields import solve_sources
-from spem.fields.sources import Sources
+from spem.fields.superposition.fields import solve_sources
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,9 +11,9 @@ from scipy.sparse.csgraph import dijkstra
 
 from spem.decomposition.measurements import centred_logs
 from spem.decomposition.transport import Coupling, couple
-from spem.fields.boundary_points import point_graph
-from spem.fields.source_fields import SourceFields
-from spem.fields.sources import Sources
+from spem.fields.boundary.points import point_graph
+from spem.fields.boundary.sources import Sources
+from spem.fields.superposition.fields import SourceFields
 
 # Quantiles at which the distances from one source to all others are compared.
 _QUANTILES = 40
@@ -42,8 +42,8 @@ def source_distances(fields: SourceFields) -> NDArray[np.float64]:
     Examples
     --------
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.superposition.fields import solve_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> sources = point_sources(assemble(Shape.from_mask(np.ones(3)), "voxel"))
     >>> source_distances(solve_sources(sources, np.inf)).round(2)

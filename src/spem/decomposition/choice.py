@@ -13,7 +13,7 @@ from spem.decomposition.division import SPARSITY, check_division, limit_of
 from spem.decomposition.measurements import Centre, Over, measurements
 from spem.decomposition.sparse_coding import fit_counts
 from spem.errors import ParameterError
-from spem.fields.source_fields import SourceFields
+from spem.fields.superposition.fields import SourceFields
 
 # The curve is read to three digits.
 _TOL = 1e-4

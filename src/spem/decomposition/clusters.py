@@ -15,7 +15,7 @@ from sklearn.mixture import GaussianMixture
 
 from spem.decomposition.measurements import OVERS, Over, centred_logs
 from spem.errors import ParameterError, require_kind
-from spem.fields.source_fields import SourceFields
+from spem.fields.superposition.fields import SourceFields
 
 Method = Literal["kmeans", "mixture"]
 METHODS = ("kmeans", "mixture")

@@ -11,7 +11,7 @@ from spem.decomposition.measurements import Centre, Over, measurements
 from spem.decomposition.parts import Parts, strongest_part, touched_part
 from spem.decomposition.sparse_coding import NonnegativeSparseCoding, largest_sparsity
 from spem.errors import ParameterError
-from spem.fields.source_fields import SourceFields
+from spem.fields.superposition.fields import SourceFields
 
 # A sample belongs to no part where the components together explain less than this share of its square.
 MIN_EXPLAINED = 0.1
@@ -55,8 +55,8 @@ def region_parts(
     --------
     >>> import spem
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.superposition.fields import solve_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> bone = np.pad(np.ones((3, 20)), ((4, 4), (0, 0)))
     >>> bone[:, :8] = bone[:, -8:] = 1
     >>> shape = spem.Shape.from_mask(bone, name="bone")

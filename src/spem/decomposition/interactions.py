@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import ParameterError
-from spem.fields.source_fields import SourceFields
+from spem.fields.superposition.fields import SourceFields
 
 # Two vectors need this many shared entries for a correlation to mean anything.
 _FEWEST = 3

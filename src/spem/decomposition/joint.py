@@ -16,7 +16,7 @@ from spem.decomposition.measurements import Centre, Over, measurements
 from spem.decomposition.parts import Parts
 from spem.decomposition.sparse_coding import NonnegativeSparseCoding, largest_sparsity
 from spem.errors import ParameterError
-from spem.fields.source_fields import SourceFields
+from spem.fields.superposition.fields import SourceFields
 
 Array = NDArray[np.float64]
 
@@ -73,8 +73,8 @@ def joint_parts(
     Examples
     --------
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.superposition.fields import solve_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> hook = np.zeros((24, 24))
     >>> hook[2:22, 2:7] = hook[16:22, 2:14] = 1

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError
-from spem.fields.source_fields import SourceFields
+from spem.fields.superposition.fields import SourceFields
 
 Centre = Literal["mean", "median"]
 Over = Literal["region", "boundary"]
@@ -49,8 +49,8 @@ def centred_logs(
     --------
     >>> import numpy as np
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.superposition.fields import solve_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> sources = point_sources(assemble(Shape.from_mask(np.ones(3)), "voxel"))
     >>> centred_logs(solve_sources(sources, np.inf)).round(2)[0]

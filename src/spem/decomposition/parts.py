@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spem.decomposition.measurements import Over
 from spem.errors import ParameterError
-from spem.fields.sources import Sources
+from spem.fields.boundary.sources import Sources
 from spem.shapes.shape import Shape
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from spem.decomposition.parts import Parts
 from spem.errors import ReadError, SpemError
+from spem.fields.boundary.sources import restore_sources
 from spem.fields.operator import assemble
-from spem.fields.sources import restore_sources
 from spem.files import write_whole
 from spem.shapes.packing import pack_shape, unpack_shape
 
@@ -55,8 +55,8 @@ def save_parts(parts: Parts, path: str | os.PathLike[str]) -> None:
     --------
     >>> import spem, tempfile
     >>> from spem.decomposition.division import region_parts
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.superposition.fields import solve_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> system = assemble(spem.Shape.from_mask(np.ones((2, 10)), name="bar"))
     >>> parts = region_parts(solve_sources(point_sources(system), np.inf), 2)
     >>> with tempfile.TemporaryDirectory() as folder:

@@ -7,10 +7,10 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import ParameterError
+from spem.fields.boundary.sources import check_source
 from spem.fields.domain import Domain
 from spem.fields.operator import System
-from spem.fields.source_fields import SourceFields
-from spem.fields.sources import check_source
+from spem.fields.superposition.fields import SourceFields
 
 # Ratios between neighbours beyond e^600 are taken for that, so that their squares are finite.
 _MAX_LOG = 600.0

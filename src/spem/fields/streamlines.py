@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import ParameterError
+from spem.fields.boundary.sources import check_source
 from spem.fields.gradients import source_gradient, unit_vectors
 from spem.fields.operator import System
-from spem.fields.source_fields import SourceFields
-from spem.fields.sources import check_source
 from spem.fields.stepping import BOUNDARY, LENGTH, SOURCE, STAGNATION, follow
+from spem.fields.superposition.fields import SourceFields
 
 ENDS = {BOUNDARY: "boundary", STAGNATION: "stagnation", LENGTH: "length", SOURCE: "source"}
 # Lines are followed over at most this many times the sum of the sides of the grid.

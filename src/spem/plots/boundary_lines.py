@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
 
-    from spem.fields.sources import Sources
+    from spem.fields.boundary.sources import Sources
 
 
 def draw_boundary(
@@ -48,7 +48,7 @@ def draw_boundary(
     Examples
     --------
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.plots.style import new_figure
     >>> from spem.shapes.shape import Shape
     >>> sources = point_sources(assemble(Shape.from_mask(np.ones((2, 2)))))

@@ -9,8 +9,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Rectangle
 
 from spem.decomposition.measurements import Centre, measurements
+from spem.fields.boundary.sources import check_source
 from spem.fields.gradients import source_gradient, unit_vectors
-from spem.fields.sources import check_source
 from spem.fields.streamlines import even_nodes, source_streamlines
 from spem.plots.camera import Camera, picture_aspect, picture_size, principal_view, view_rotation
 from spem.plots.fields import draw_outline, draw_values
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from spem.fields.source_fields import SourceFields
-    from spem.fields.sources import Sources
+    from spem.fields.boundary.sources import Sources
+    from spem.fields.superposition.fields import SourceFields
     from spem.plots.camera import View
     from spem.plots.streams import Window
     from spem.shapes.shape import Shape
@@ -68,8 +68,8 @@ def figure_source(
     Examples
     --------
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.superposition.fields import solve_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> fields = solve_sources(point_sources(assemble(Shape.from_mask(np.ones((6, 12))))), np.inf)
     >>> [ax.get_title() for ax in figure_source(fields, 0).axes[:3]]
@@ -125,8 +125,8 @@ def figure_solid_source(
     Examples
     --------
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.superposition.fields import solve_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> fields = solve_sources(point_sources(assemble(Shape.from_mask(np.ones((3, 3, 5))))), np.inf)
     >>> [ax.get_title() for ax in figure_solid_source(fields, 0).axes[:2]]
@@ -177,8 +177,8 @@ def figure_measurements(fields: SourceFields, source: int) -> Figure:
     Examples
     --------
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.superposition.fields import solve_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> fields = solve_sources(point_sources(assemble(Shape.from_mask(np.ones((6, 12))))), np.inf)
     >>> [ax.get_title() for ax in figure_measurements(fields, 0).axes[:2]]
@@ -218,8 +218,8 @@ def figure_superposition(slices: Sequence[SourceFields]) -> Figure:
     Examples
     --------
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.source_fields import solve_sources
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.superposition.fields import solve_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> sources = point_sources(assemble(Shape.from_mask(np.ones(9))))
     >>> len(figure_superposition([solve_sources(sources, rho) for rho in (1.0, 5.0)]).axes)

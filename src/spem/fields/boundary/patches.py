@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError
-from spem.fields.cells import equal_cells
+from spem.fields.boundary.cells import equal_cells
+from spem.fields.boundary.sources import Sources, point_sources
 from spem.fields.operator import System
-from spem.fields.sources import Sources, point_sources
 
 
 def patch_sources(system: System, count: int, rng: np.random.Generator | None = None) -> Sources:
@@ -61,7 +61,7 @@ def divide_points(single: Sources, count: int, rng: np.random.Generator | None =
     Parameters
     ----------
     single
-        Sources of one point each, from `spem.fields.sources.point_sources`.
+        Sources of one point each, from `spem.fields.boundary.sources.point_sources`.
     count, rng
         As for `patch_sources`.
 

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import ParameterError, SizeError
+from spem.fields.boundary.sources import Sources
 from spem.fields.rho import check_rho
 from spem.fields.solvers.protocol import SourceSolver
-from spem.fields.source_axes import Index, numbers, samples
-from spem.fields.source_blocks import Blocks, KeptBlocks, SolvedBlocks
-from spem.fields.source_fields import BLOCK_COPIES, Progress, SourceFields, block_size
-from spem.fields.source_slice import source_solver
-from spem.fields.sources import Sources
+from spem.fields.superposition.axes import Index, numbers, samples
+from spem.fields.superposition.blocks import Blocks, KeptBlocks, SolvedBlocks
+from spem.fields.superposition.fields import BLOCK_COPIES, Progress, SourceFields, block_size
+from spem.fields.superposition.slices import source_solver
 from spem.shapes.limits import format_size, memory_limit_bytes
 from spem.shapes.shape import Shape
 
@@ -59,7 +59,7 @@ class SourceHyperfield:
     --------
     >>> import numpy as np
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> system = assemble(Shape.from_mask(np.ones((3, 4)), name="brick"))
     >>> hyperfield = SourceHyperfield(point_sources(system), [1.0, 2.0, np.inf])
@@ -198,21 +198,21 @@ class SourceHyperfield:
         log
             Logarithms, or the fields themselves.
         """
-        from spem.fields.source_labels import label
+        from spem.fields.superposition.labels import label
 
         self._check_log(log)
         return label(self, log=log)
 
     def save(self, path: str | Path, *, progress: Progress | None = None) -> None:
         """Write the hyperfield to a zarr group, block by block; a save that was stopped continues."""
-        from spem.fields.source_storage import save_source_hyperfield
+        from spem.fields.superposition.storage import save_source_hyperfield
 
         save_source_hyperfield(self, path, progress)
 
     @classmethod
     def load(cls, path: str | Path, *, memory_limit: int | None = None) -> SourceHyperfield:
         """Open a hyperfield that `save` wrote; fields are read when they are asked for."""
-        from spem.fields.source_storage import load_source_hyperfield
+        from spem.fields.superposition.storage import load_source_hyperfield
 
         return load_source_hyperfield(path, memory_limit)
 

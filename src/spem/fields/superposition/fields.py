@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import SizeError
+from spem.fields.boundary.sources import Sources
 from spem.fields.rho import single_rho
 from spem.fields.solvers.protocol import SourceSolver
-from spem.fields.source_slice import prepare_slice, require_entrywise, source_solver
-from spem.fields.sources import Sources
+from spem.fields.superposition.slices import prepare_slice, require_entrywise, source_solver
 from spem.shapes.limits import format_size, memory_limit_bytes
 
 #: Called with a stage's name, how much of it is done, and of how much.
@@ -91,7 +91,7 @@ def solve_sources(
 
     >>> import numpy as np
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> fields = solve_sources(point_sources(assemble(Shape.from_mask(np.ones((3, 4))))), np.inf)
     >>> fields
@@ -135,7 +135,7 @@ def source_values(
     >>> import numpy as np
     >>> from spem.fields.operator import assemble
     >>> from spem.fields.solvers.cg import ConjugateGradient
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> sources = point_sources(assemble(Shape.from_mask(np.ones(3)), "voxel"))
     >>> source_values(sources, np.inf, solver=ConjugateGradient()).round(6)

@@ -10,13 +10,13 @@ from hypothesis.extra import numpy as hnp
 
 import spem
 from spem.errors import ConvergenceError, ParameterError, SizeError
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
 from spem.fields.solvers.cg import ConjugateGradient
 from spem.fields.solvers.direct import Direct
 from spem.fields.solvers.explicit import ExplicitIteration
 from spem.fields.solvers.sweep import Sweep
-from spem.fields.source_fields import solve_sources, source_values
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import solve_sources, source_values
 from spem.shapes.shape import Cuts, Shape
 
 MASKS = hnp.arrays(

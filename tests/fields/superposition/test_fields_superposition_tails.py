@@ -9,14 +9,14 @@ import mpmath
 import numpy as np
 import pytest
 
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
 from spem.fields.solvers.direct import Direct
-from spem.fields.source_fields import solve_sources
-from spem.fields.source_tails import far_system
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import solve_sources
+from spem.fields.superposition.tails import far_system
 from spem.shapes.shape import Cuts, Shape
 
-EXACT = Path(__file__).parents[2] / "benchmarks" / "_exact.py"
+EXACT = Path(__file__).parents[3] / "benchmarks" / "_exact.py"
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.sparse.csgraph import connected_components
 
-from spem.fields.boundary_points import point_graph
-from spem.fields.cells import equal_cells
+from spem.fields.boundary.cells import equal_cells
+from spem.fields.boundary.points import point_graph
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.sources import point_sources
 from spem.shapes.shape import Shape
 from spem.shapes.synthetic import shell
 

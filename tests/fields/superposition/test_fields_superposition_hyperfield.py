@@ -11,14 +11,14 @@ import pytest
 import xarray
 
 from spem.errors import ParameterError, ReadError, SizeError
+from spem.fields.boundary.sources import Sources, point_sources
 from spem.fields.operator import assemble
 from spem.fields.solvers.cg import ConjugateGradient
 from spem.fields.solvers.direct import Direct
 from spem.fields.solvers.sweep import Sweep
-from spem.fields.source_blocks import Recent
-from spem.fields.source_fields import solve_sources
-from spem.fields.source_hyperfield import SourceHyperfield
-from spem.fields.sources import Sources, point_sources
+from spem.fields.superposition.blocks import Recent
+from spem.fields.superposition.fields import solve_sources
+from spem.fields.superposition.hyperfield import SourceHyperfield
 from spem.shapes.shape import Cuts, Shape
 
 RHO = [1.0, 4.0, np.inf]

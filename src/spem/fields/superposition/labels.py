@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from spem.fields.source_hyperfield import SourceHyperfield
+from spem.fields.superposition.hyperfield import SourceHyperfield
 
 _DIMS = ("rho", "source", "node")
 
@@ -56,7 +56,7 @@ def label(hyperfield: SourceHyperfield, *, log: bool) -> xarray.DataArray:
     Examples
     --------
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> sources = point_sources(assemble(Shape.from_mask(np.ones(3)), "voxel"))
     >>> labelled = label(SourceHyperfield(sources, [1.0, np.inf]), log=False)

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from spem.fields.boundary_points import boundary_points, point_graph
-from spem.fields.contours import trace_contours
+from spem.fields.boundary.contours import trace_contours
+from spem.fields.boundary.points import boundary_points, point_graph
 from spem.fields.operator import assemble
 from spem.shapes.shape import Shape
 from spem.shapes.synthetic import annulus, ball, disk, shell

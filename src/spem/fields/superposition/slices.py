@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError
+from spem.fields.boundary.sources import Sources
 from spem.fields.rho import single_rho
 from spem.fields.solvers.direct import Direct
 from spem.fields.solvers.protocol import Prepared, SourceSolver
-from spem.fields.source_tails import logs, scaled, solve_tails
-from spem.fields.sources import Sources
+from spem.fields.superposition.tails import logs, scaled, solve_tails
 
 # In units of the spacing: below it a field falls by more than 1e4 from node to node, and means nothing there,
 # while its tails would be solved again every few dozen nodes.
@@ -87,7 +87,7 @@ def prepare_slice(sources: Sources, rho: float, solver: SourceSolver | None = No
     --------
     >>> import numpy as np
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> sources = point_sources(assemble(Shape.from_mask(np.ones(3)), "voxel"))
     >>> prepare_slice(sources, np.inf).values(0, 2)

@@ -9,7 +9,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from spem.fields.contours import face_areas, face_neighbours, trace_contours
+from spem.fields.boundary.contours import face_areas, face_neighbours, trace_contours
 from spem.fields.operator import System
 
 

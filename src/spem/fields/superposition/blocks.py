@@ -11,9 +11,9 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from spem.fields.boundary.sources import Sources
 from spem.fields.solvers.protocol import Prepared, SourceSolver
-from spem.fields.source_slice import SourceSlice, prepare_slice
-from spem.fields.sources import Sources
+from spem.fields.superposition.slices import SourceSlice, prepare_slice
 
 Value = TypeVar("Value")
 

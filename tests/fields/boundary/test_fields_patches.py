@@ -12,9 +12,9 @@ from scipy.sparse.csgraph import connected_components
 
 import spem
 from spem.errors import ParameterError
-from spem.fields.boundary_points import boundary_points, point_graph
+from spem.fields.boundary.patches import patch_sources
+from spem.fields.boundary.points import boundary_points, point_graph
 from spem.fields.operator import assemble
-from spem.fields.patches import patch_sources
 from spem.shapes.shape import Shape
 from spem.shapes.synthetic import annulus, ball, disk, n_ball, shell
 

@@ -14,11 +14,11 @@ import zarr
 from numpy.typing import NDArray
 
 from spem.errors import ReadError
+from spem.fields.boundary.sources import restore_sources
 from spem.fields.operator import assemble
-from spem.fields.source_fields import Progress
-from spem.fields.source_hyperfield import SourceHyperfield
-from spem.fields.sources import restore_sources
 from spem.fields.storage import digest, only_writer, put_in_place, write_arrays
+from spem.fields.superposition.fields import Progress
+from spem.fields.superposition.hyperfield import SourceHyperfield
 from spem.shapes.packing import pack_shape, unpack_shape
 
 FORMAT = 1
@@ -53,7 +53,7 @@ def save_source_hyperfield(
     Examples
     --------
     >>> import tempfile
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.shape import Shape
     >>> sources = point_sources(assemble(Shape.from_mask(np.ones((3, 4)))))
     >>> with tempfile.TemporaryDirectory() as folder:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from spem.fields.contours import face_areas, face_neighbours, trace_contours
+from spem.fields.boundary.contours import face_areas, face_neighbours, trace_contours
 from spem.fields.domain import surface_domain, voxel_domain
 from spem.shapes.shape import Cuts, Shape
 from spem.shapes.synthetic import annulus, ball, disk, n_ball

@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from spem.fields.boundary_points import point_graph
-from spem.fields.sources import Sources
+from spem.fields.boundary.points import point_graph
+from spem.fields.boundary.sources import Sources
 
 # Rounds in which cells move to their centroids, and all rounds.
 _MOVES = 12
@@ -48,7 +48,7 @@ def equal_cells(single: Sources, shares: NDArray[np.int64], offsets: NDArray[np.
     Examples
     --------
     >>> from spem.fields.operator import assemble
-    >>> from spem.fields.sources import point_sources
+    >>> from spem.fields.boundary.sources import point_sources
     >>> from spem.shapes.synthetic import ball
     >>> points = point_sources(assemble(ball(1.0, 0.1)))
     >>> cell = equal_cells(points, np.array([6]), np.array([0]))

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from spem.errors import ParameterError
+from spem.fields.boundary.patches import patch_sources
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.patches import patch_sources
-from spem.fields.sources import point_sources
 from spem.shapes.shape import Shape
 from spem.shapes.synthetic import disk
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
 from spem.errors import ParameterError
-from spem.fields.boundary_points import BoundaryPoints, boundary_points
+from spem.fields.boundary.points import BoundaryPoints, boundary_points
 from spem.fields.operator import System
 from spem.shapes.shape import Shape
 
