@@ -20,7 +20,7 @@ from _table import Benchmark, Row, data_root, timed
 from spem.decomposition.choice import error_curve
 from spem.decomposition.division import boundary_parts, region_parts
 from spem.decomposition.joint import joint_parts
-from spem.fields.source_fields import SourceFields
+from spem.fields.superposition.fields import SourceFields
 
 Setting = tuple[str, int]
 Scores = tuple[float, float, float]

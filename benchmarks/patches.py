@@ -8,10 +8,10 @@ from scipy.sparse.csgraph import connected_components
 
 import spem
 from _table import Benchmark, Row, data_root, timed
-from spem.fields.boundary_points import boundary_points, point_graph
+from spem.fields.boundary.patches import patch_sources
+from spem.fields.boundary.points import boundary_points, point_graph
+from spem.fields.boundary.sources import Sources
 from spem.fields.operator import assemble
-from spem.fields.patches import patch_sources
-from spem.fields.sources import Sources
 from spem.shapes.shape import Shape
 
 LIMIT = 1.3  # largest patch over the mean, with ten points to a patch and more

@@ -18,9 +18,9 @@ from spem.decomposition.joint import joint_parts
 from spem.decomposition.matching import match_parts
 from spem.decomposition.parts import Parts
 from spem.decomposition.transfer import vertex_labels
+from spem.fields.boundary.patches import patch_sources
 from spem.fields.operator import assemble
-from spem.fields.patches import patch_sources
-from spem.fields.source_fields import SourceFields, solve_sources
+from spem.fields.superposition.fields import SourceFields, solve_sources
 
 LIMIT = 0.80
 VOXELS, PATCHES, N_PARTS = 15_000, 200, 8

@@ -13,10 +13,10 @@ import numpy as np
 
 from _exact import bar_logs
 from _table import Benchmark, Row, timed
+from spem.fields.boundary.sources import Sources, point_sources
 from spem.fields.operator import assemble
 from spem.fields.solvers.cg import ConjugateGradient
-from spem.fields.source_fields import solve_sources, source_values
-from spem.fields.sources import Sources, point_sources
+from spem.fields.superposition.fields import solve_sources, source_values
 from spem.shapes.shape import Shape
 
 LIMIT = 1e-11

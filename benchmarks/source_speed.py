@@ -22,11 +22,11 @@ import spem
 from _memory import peak
 from _shapes import ball
 from _table import Benchmark, Row, data_root, slope, timed
+from spem.fields.boundary.patches import patch_sources
+from spem.fields.boundary.sources import Sources, point_sources
 from spem.fields.operator import assemble
-from spem.fields.patches import patch_sources
 from spem.fields.solvers.direct import Direct
-from spem.fields.source_fields import solve_sources
-from spem.fields.sources import Sources, point_sources
+from spem.fields.superposition.fields import solve_sources
 from spem.shapes.shape import Shape
 
 PATCHES = 200

@@ -26,9 +26,9 @@ from _table import Benchmark, Row, data_root
 from spem.decomposition.coding_descent import encode, objective
 from spem.decomposition.coding_search import RULES
 from spem.decomposition.sparse_coding import NonnegativeSparseCoding, fit_counts, largest_sparsity
+from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
-from spem.fields.source_fields import solve_sources
-from spem.fields.sources import point_sources
+from spem.fields.superposition.fields import solve_sources
 
 try:
     import spams
