@@ -1,14 +1,27 @@
-"""Files written in one step: whole, or not at all."""
+"""Files written in one step, whole or not at all, and what reading damaged ones raises."""
 
 from __future__ import annotations
 
 import os
 import secrets
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
 from spem.errors import ParameterError
+
+#: What zipfile, numpy and json raise on bytes that are not what they expect.
+DAMAGE = (
+    OSError,
+    ValueError,
+    LookupError,
+    TypeError,
+    EOFError,
+    MemoryError,
+    RuntimeError,
+    zipfile.BadZipFile,
+)
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], object]) -> None:

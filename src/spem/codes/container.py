@@ -14,22 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ModelError, ReadError
-from spem.files import write_whole
+from spem.files import DAMAGE, write_whole
 from spem.shapes.kinds import kind_of
 
 # Raised when the layout of the file changes: names of arrays, keys of the header, the hash.
 CONTAINER_FORMAT = 1
-# What zipfile, numpy and json raise on bytes that are not what they expect.
-_DAMAGE = (
-    OSError,
-    ValueError,
-    LookupError,
-    TypeError,
-    EOFError,
-    MemoryError,
-    RuntimeError,
-    zipfile.BadZipFile,
-)
 
 
 def content_hash(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
@@ -113,7 +102,7 @@ def read_container(path: str | os.PathLike[str], kind: str) -> tuple[dict[str, A
         stated = members.pop("sha256").tobytes().hex()
         envelope = json.loads(members.pop("header").tobytes())
         found, version, header = envelope["kind"], int(envelope["format"]), dict(envelope["header"])
-    except _DAMAGE as error:
+    except DAMAGE as error:
         other = kind_of(source)
         if other:
             msg = f"{source}: is {other}, not spem {kind}; give another file"

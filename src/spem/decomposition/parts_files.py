@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +14,10 @@ from spem.decomposition.parts import Parts
 from spem.errors import ReadError, SpemError
 from spem.fields.boundary.sources import restore_sources
 from spem.fields.operator import assemble
-from spem.files import write_whole
+from spem.files import DAMAGE, write_whole
 from spem.shapes.packing import pack_shape, unpack_shape
 
 FORMAT = 1
-# What zipfile, numpy and json raise on bytes that are not what they expect.
-_DAMAGE = (
-    OSError,
-    ValueError,
-    LookupError,
-    TypeError,
-    EOFError,
-    MemoryError,
-    RuntimeError,
-    zipfile.BadZipFile,
-)
 
 
 def save_parts(parts: Parts, path: str | os.PathLike[str]) -> None:
@@ -89,7 +77,7 @@ def load_parts(path: str | os.PathLike[str]) -> Parts:
         if version == FORMAT:
             return _assemble(about, arrays)
         reason = f"format {version}, expected {FORMAT}"
-    except (*_DAMAGE, SpemError) as error:
+    except (*DAMAGE, SpemError) as error:
         msg = f"{source}: no whole parts of a shape ({error}); divide the shape again"
         raise ReadError(msg) from error
     msg = f"{source}: parts of {reason}; divide the shape again with this spem"
