@@ -26,6 +26,7 @@ RHO = [0.05, 0.1, 0.2, 0.4]
 DIVIDED = "dog"
 POSES = 3
 PART_VOXELS = {2: 3000, 3: 6000}
+PARTS = {2: 8, 3: 9}
 
 
 def demo(
@@ -123,6 +124,7 @@ def _divide(paths: Sequence[str], picture: Path) -> list[Path]:
 
     solid = all(has_suffix(Path(path), MESH_SUFFIXES) for path in paths)
     files = PartFiles(tuple(paths), None, picture, picture.with_suffix(".html") if solid else None, None)
-    shapes = [spem.read(path, voxels=PART_VOXELS[3 if solid else 2]) for path in paths]
-    files.write(divide(shapes, PartsRequest()))
+    ndim = 3 if solid else 2
+    shapes = [spem.read(path, voxels=PART_VOXELS[ndim]) for path in paths]
+    files.write(divide(shapes, PartsRequest(PARTS[ndim])))
     return files.written()

@@ -13,7 +13,7 @@ from spem.decomposition.division import SPARSITY, check_division, limit_of
 from spem.decomposition.measurements import Centre, Over, measurements
 from spem.decomposition.sparse_coding import fit_counts
 from spem.errors import ParameterError
-from spem.fields.superposition.fields import SourceFields
+from spem.fields.superposition.fields import SourceFields, require_fields
 
 # The curve is read to three digits.
 _TOL = 1e-4
@@ -100,6 +100,7 @@ def error_curve(
     if not isinstance(asked, int | np.integer) or asked < 1:
         msg = f"most={most!r}: expected a whole number of parts, at least 1"
         raise ParameterError(msg)
+    require_fields(fields)
     most = min(most, fields.sources.n_sources, fields.sources.system.n_nodes)
     check_division(fields, most, sparsity)
     measured = measurements(fields, centre, over=over)

@@ -14,8 +14,8 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.mixture import GaussianMixture
 
 from spem.decomposition.measurements import OVERS, Over, centred_logs
-from spem.errors import ParameterError, require_kind
-from spem.fields.superposition.fields import SourceFields
+from spem.errors import ParameterError
+from spem.fields.superposition.fields import SourceFields, require_fields
 
 Method = Literal["kmeans", "mixture"]
 METHODS = ("kmeans", "mixture")
@@ -108,7 +108,7 @@ def cluster_interactions(
     >>> cluster_interactions(fields, 2)
     Clusters(2 of 90, sizes 48, 42)
     """
-    require_kind(fields, SourceFields, "solve for them first: spem.source_fields(spem.sources(shape))")
+    require_fields(fields)
     if method not in METHODS or over not in OVERS:
         wrong = f"method={method!r}" if method not in METHODS else f"over={over!r}"
         msg = f"{wrong}: expected {' or '.join(map(repr, METHODS if method not in METHODS else OVERS))}"

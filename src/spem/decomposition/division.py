@@ -11,7 +11,7 @@ from spem.decomposition.measurements import Centre, Over, measurements
 from spem.decomposition.parts import Parts, strongest_part, touched_part
 from spem.decomposition.sparse_coding import NonnegativeSparseCoding, largest_sparsity
 from spem.errors import ParameterError
-from spem.fields.superposition.fields import SourceFields
+from spem.fields.superposition.fields import SourceFields, require_fields
 
 # A sample belongs to no part where the components together explain less than this share of its square.
 MIN_EXPLAINED = 0.1
@@ -176,6 +176,7 @@ def check_division(fields: SourceFields, n_parts: Any, sparsity: Any) -> None:
     ParameterError
         When `n_parts` is no whole number or more than the sources or nodes, or `sparsity` is not in [0, 1).
     """
+    require_fields(fields)
     sources, name = fields.sources, fields.sources.system.shape.name
     n_nodes = sources.system.n_nodes
     most = min(sources.n_sources, n_nodes)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import ParameterError
-from spem.fields.superposition.fields import SourceFields
+from spem.fields.superposition.fields import SourceFields, require_fields
 
 # Two vectors need this many shared entries for a correlation to mean anything.
 _FEWEST = 3
@@ -59,6 +59,7 @@ def node_correlation(
     >>> node_correlation(fields, 0, [0, 3, 8]).round(2)
     array([ 1.  ,  0.57, -0.98])
     """
+    require_fields(fields)
     count = fields.log.shape[1]
     return _correlate(
         _node_vectors(fields),
@@ -102,6 +103,7 @@ def source_correlation(
     >>> source_correlation(fields, 0).round(3)
     array([ 1., -1.])
     """
+    require_fields(fields)
     log, count = fields.log, fields.log.shape[0]
     finite = np.isfinite(log)
     reaching = np.maximum(np.count_nonzero(finite, axis=0), 1)
@@ -151,6 +153,7 @@ def source_node_correlation(
     >>> bool(np.linalg.norm(brick.points[nearest] - fields.sources.position[0]) < 1)
     True
     """
+    require_fields(fields)
     return _correlate(
         lambda chosen: boundary_interactions(fields, chosen),
         _numbers(fields, "source", sources, fields.log.shape[0]),
@@ -191,6 +194,7 @@ def boundary_interactions(fields: SourceFields, sources: ArrayLike | None = None
     array([[0.75, 0.25],
            [0.25, 0.75]])
     """
+    require_fields(fields)
     chosen = _numbers(fields, "source", sources, fields.log.shape[0]).ravel()
     rhs = fields.sources.rhs
     result = np.empty((chosen.size, fields.log.shape[0]))

@@ -15,7 +15,7 @@ from spem.decomposition.matched import MatchedParts
 from spem.decomposition.measurements import Centre, Over, measurements
 from spem.decomposition.parts import Parts
 from spem.decomposition.sparse_coding import NonnegativeSparseCoding, largest_sparsity
-from spem.errors import ParameterError
+from spem.errors import ParameterError, require_kind
 from spem.fields.superposition.fields import SourceFields
 
 Array = NDArray[np.float64]
@@ -134,12 +134,14 @@ def _unit(rows: Array) -> Array:
 
 def _check(fields: Sequence[SourceFields], n_parts: int, sparsity: float, reference: int | None) -> None:
     """Refuse shapes and parameters that do not go together."""
+    require_kind(fields, Sequence, "give the fields of all shapes as a list")
     if not fields:
         msg = "no shapes: expected the fields of one shape or several"
         raise ParameterError(msg)
-    first = fields[0].sources.system.shape
     for f in fields:
         check_division(f, n_parts, sparsity)
+    first = fields[0].sources.system.shape
+    for f in fields:
         shape = f.sources.system.shape
         if f.rho != fields[0].rho:
             msg = f"{shape.name} has ρ {f.rho:g}, {first.name} has {fields[0].rho:g}: expected one ρ for all"

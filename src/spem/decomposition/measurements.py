@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError
-from spem.fields.superposition.fields import SourceFields
+from spem.fields.superposition.fields import SourceFields, require_fields
 
 Centre = Literal["mean", "median"]
 Over = Literal["region", "boundary"]
@@ -56,6 +56,7 @@ def centred_logs(
     >>> centred_logs(solve_sources(sources, np.inf)).round(2)[0]
     array([ 0.55,  0.  , -0.55])
     """
+    require_fields(fields)
     _check_word("centre", centre, CENTRES)
     _check_word("over", over, OVERS)
     log = fields.log
@@ -92,6 +93,7 @@ def measurements(
     ParameterError
         When `centre` or `over` is another word.
     """
+    require_fields(fields)
     unreached = np.isneginf(fields.log)
     if unreached.any():
         weakest = fields.log.min(where=~unreached, initial=0.0)

@@ -10,7 +10,7 @@ from spem.errors import ParameterError
 from spem.fields.boundary.sources import check_source
 from spem.fields.domain import Domain
 from spem.fields.operator import System
-from spem.fields.superposition.fields import SourceFields
+from spem.fields.superposition.fields import SourceFields, require_fields
 
 # Ratios between neighbours beyond e^600 are taken for that, so that their squares are finite.
 _MAX_LOG = 600.0
@@ -128,6 +128,7 @@ def source_gradient(fields: SourceFields, source: int) -> NDArray[np.float64]:
     >>> source_gradient(spem.source_fields(sources, np.inf), 0).round(2).ravel()
     array([-0.33, -0.5 , -1.  ])
     """
+    require_fields(fields)
     check_source(fields.sources, source)
     with np.errstate(divide="ignore"):
         ends = np.log((fields.sources.edge_source == source).astype(np.float64))

@@ -13,7 +13,7 @@ from spem.fields.boundary.sources import check_source
 from spem.fields.gradients import source_gradient, unit_vectors
 from spem.fields.operator import System
 from spem.fields.stepping import BOUNDARY, LENGTH, SOURCE, STAGNATION, follow
-from spem.fields.superposition.fields import SourceFields
+from spem.fields.superposition.fields import SourceFields, require_fields
 
 ENDS = {BOUNDARY: "boundary", STAGNATION: "stagnation", LENGTH: "length", SOURCE: "source"}
 # Lines are followed over at most this many times the sum of the sides of the grid.
@@ -140,6 +140,7 @@ def source_streamlines(
     >>> line[0].tolist(), line[-1].tolist() == sources.position[0].tolist()
     ([2.0, 8.0], True)
     """
+    require_fields(fields)
     sources, system = fields.sources, fields.sources.system
     check_source(sources, source)
     node, _ = system.domain.boundary_edges

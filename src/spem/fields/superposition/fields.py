@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import SizeError
+from spem.errors import SizeError, require_kind
 from spem.fields.boundary.sources import Sources
 from spem.fields.rho import single_rho
 from spem.fields.solvers.protocol import SourceSolver
@@ -52,6 +52,17 @@ class SourceFields:
     def __repr__(self) -> str:
         sizes = f"{self.log.shape[0]} sources, {self.log.shape[1]} nodes, rho {self.rho:.4g}"
         return f"SourceFields({self.sources.system.shape.name!r}, {sizes})"
+
+
+def require_fields(fields: object) -> None:
+    """Refuse what is no fields of sources.
+
+    Raises
+    ------
+    ParameterError
+        If it is something else; it says how fields are made.
+    """
+    require_kind(fields, SourceFields, "solve for them first: spem.source_fields(spem.sources(shape))")
 
 
 def solve_sources(
