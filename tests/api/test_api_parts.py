@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import spem
-from spem.errors import ParameterError
+from spem.errors import ParameterError, SizeError
 
 
 def bone(n: int = 20) -> spem.Shape:
@@ -97,3 +97,10 @@ def test_a_spacing_beyond_floating_point_is_refused(spacing):
     """Squares of the spacing must be numbers."""
     with pytest.raises(ParameterError, match="use another unit of length"):
         spem.sources(spem.Shape.from_mask(np.ones((3, 3)), spacing))
+
+
+def test_shapes_that_do_not_fit_in_memory_together_are_refused(monkeypatch):
+    """Before anything is solved it is said what all of them need."""
+    monkeypatch.setenv("SPEM_MEMORY_LIMIT", "1M")
+    with pytest.raises(SizeError, match=r"fields and measurements of 3 shapes together need .*; take fewer"):
+        spem.parts([bone(20), bone(26), bone(32)], 3)

@@ -16,7 +16,7 @@ from spem.errors import ParameterError, require_kind
 from spem.fields.boundary.patches import divide_points, patch_sources
 from spem.fields.boundary.sources import Sources, point_sources
 from spem.fields.operator import Boundary, assemble
-from spem.fields.superposition.fields import SourceFields, solve_sources
+from spem.fields.superposition.fields import SourceFields, solve_several, solve_sources
 from spem.shapes.shape import Shape
 
 # Enough to tell fingers apart; more, up to every boundary point, make parts no steadier.
@@ -187,9 +187,8 @@ def parts(
     several: Sequence[Shape] = list(shapes) if together else [shapes]  # type: ignore[arg-type, list-item]
     for shape in several:
         require_kind(shape, Shape, "read it first: spem.read(...)")
-    fields = [
-        source_fields(part_sources(shape, n_patches, boundary=boundary, rng=rng), rho) for shape in several
-    ]
+    divided = [part_sources(shape, n_patches, boundary=boundary, rng=rng) for shape in several]
+    fields = solve_several(divided, rho)
     if not isinstance(shapes, Shape):
         return list(joint_parts(fields, n_parts, over=over, sparsity=sparsity, rng=rng).parts)
     return _DIVIDE[over](fields[0], n_parts, sparsity=sparsity, rng=rng)

@@ -18,8 +18,7 @@ from spem.decomposition.joint import joint_parts
 from spem.decomposition.parts import Parts
 from spem.errors import ParameterError, SizeError
 from spem.fields.boundary.sources import Sources
-from spem.fields.superposition.fields import SourceFields, solve_sources
-from spem.shapes.limits import format_size, memory_limit_bytes
+from spem.fields.superposition.fields import SourceFields, solve_several
 
 if TYPE_CHECKING:
     from spem.shapes.shape import Shape
@@ -90,9 +89,8 @@ def _solve(shapes: Sequence[Shape], request: PartsRequest, rng: np.random.Genera
     several = [part_sources(shape, request.n_patches, boundary=request.boundary, rng=rng) for shape in shapes]
     for sources in several:
         _check_count(sources, request.n_parts)
-    _check_memory(several)
     with Bar() as bar:
-        return [solve_sources(sources, request.rho, progress=bar.advance) for sources in several]
+        return solve_several(several, request.rho, progress=bar.advance)
 
 
 def _check_count(sources: Sources, n_parts: int | None) -> None:
@@ -102,17 +100,6 @@ def _check_count(sources: Sources, n_parts: int | None) -> None:
         what = f"{name} has {counted(m, 'source')} and {counted(n, 'node')}"
         msg = f"-k {n_parts}: {what}; expected at most {min(m, n)}"
         raise ParameterError(msg)
-
-
-def _check_memory(several: Sequence[Sources]) -> None:
-    """Refuse shapes that do not fit in memory together; of a single one the solver sees to that."""
-    # a measurement for each field
-    needed, limit = sum(2 * 8 * s.n_sources * s.system.n_nodes for s in several), memory_limit_bytes()
-    if len(several) > 1 and needed > limit:
-        sizes = f"{format_size(needed)}, the limit is {format_size(limit)}"
-        what = f"fields and measurements of {len(several)} shapes together"
-        msg = f"{what} need {sizes}; take fewer shapes"
-        raise SizeError(msg)
 
 
 def _divide_together(

@@ -44,7 +44,7 @@ class Factor:
     @property
     def nbytes(self) -> int:
         """Bytes that the factor holds."""
-        return sum(block.nbytes for blocks in (self.diagonal, self.below) for block in blocks)
+        return 8 * self.dissection.n_entries
 
     def solve(self, rhs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve for right-hand sides ``(n_nodes,)`` or ``(n_nodes, k)``; the result has their shape."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,6 +113,34 @@ def solve_sources(
     require_entrywise(source_solver(solver))
     log = _solve(sources, rho, solver, memory_limit, progress, log=True)
     return SourceFields(sources, single_rho(rho), log)
+
+
+def solve_several(
+    several: Sequence[Sources], rho: float, *, progress: Progress | None = None
+) -> list[SourceFields]:
+    """Solve for the sources of several shapes that are to be divided together.
+
+    Parameters
+    ----------
+    several
+        The sources of each shape.
+    rho, progress
+        As for `solve_sources`.
+
+    Raises
+    ------
+    ParameterError
+        If ρ is not a positive length.
+    SizeError
+        If the fields of all, and a measurement for each, do not fit in memory together.
+    """
+    needed, limit = sum(2 * 8 * s.n_sources * s.system.n_nodes for s in several), memory_limit_bytes()
+    if len(several) > 1 and needed > limit:
+        sizes = f"{format_size(needed)}, the limit is {format_size(limit)}"
+        what = f"fields and measurements of {len(several)} shapes together"
+        msg = f"{what} need {sizes}; take fewer shapes"
+        raise SizeError(msg)
+    return [solve_sources(sources, rho, progress=progress) for sources in several]
 
 
 def source_values(
