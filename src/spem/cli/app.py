@@ -20,6 +20,7 @@ from spem.cli.fields import field
 from spem.cli.info import info
 from spem.cli.maps import maps
 from spem.cli.output import complain
+from spem.cli.paper import paper
 from spem.cli.parts import parts
 from spem.cli.search import evaluate, search
 from spem.errors import SizeError, SpemError
@@ -98,6 +99,7 @@ def _spem(
       spem parts hand.png -o hand.npz --plot parts.png
       spem encode shapes/ -o shapes.spem          codes of a folder
       spem search shapes.spem query.obj           the most similar shapes
+      spem paper fig13 table1 -o out              figures and tables of the paper, made again
 
     Exit status: 0 all done; 1 some shapes failed, the others are saved; 2 wrong usage, or nothing could be
     done; 130 interrupted.
@@ -156,7 +158,7 @@ def _refuse(message: str) -> None:
     raise typer.Exit(NOTHING) from None
 
 
-for _command in (info, field, maps, parts, encode, search, evaluate, demo):
+for _command in (info, field, maps, parts, encode, search, evaluate, demo, paper):
     app.command()(guarded(_command))
 
 

@@ -1,0 +1,1 @@
+"""The paper reproduced: its figures, tables and claims, made again and judged."""
