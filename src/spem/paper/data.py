@@ -135,7 +135,7 @@ class Data:
         if count > len(paths):
             msg = f"{count} silhouettes of a {kind} were asked for; tari1000 has {len(paths)}"
             raise ParameterError(msg)
-        shapes = tuple(read(path, inner_radius=inner_radius) for path in paths[:count])
+        shapes = tuple(_in_pixels(read(path, inner_radius=inner_radius)) for path in paths[:count])
         return Shapes(
             shapes,
             f"The nearest real silhouettes: class {label.removeprefix('obj')} ({kind}) of the 1000-shape "
