@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: demo test check clean
+.PHONY: demo test check docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -27,6 +27,13 @@ check: $(STAMPS)/check
 	$(BIN)/python tools/check_version.py
 	$(BIN)/python tools/check_wheel.py
 
+# The site in build/docs; every script of the examples is run, in two processes of one thread.
+docs: export OMP_NUM_THREADS = 1
+docs: export NUMBA_NUM_THREADS = 1
+docs: $(STAMPS)/docs
+	$(BIN)/python -m sphinx -n -W --keep-going -q -d build/doctrees docs build/docs
+	@echo "build/docs/index.html"
+
 clean:
 	rm -rf $(VENV) build dist demo
 
@@ -45,6 +52,10 @@ $(STAMPS)/test: $(STAMPS)/spem
 	$(BIN)/python -m pip install --quiet --group test
 	touch $@
 
+$(STAMPS)/docs: $(STAMPS)/spem
+	$(BIN)/python -m pip install --quiet --group docs
+	touch $@
+
 $(STAMPS)/check: $(STAMPS)/spem
 	$(BIN)/python -m pip install --quiet --group check
-	touch $@ $(STAMPS)/test
+	touch $@ $(STAMPS)/test $(STAMPS)/docs
