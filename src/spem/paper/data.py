@@ -143,7 +143,9 @@ class Data:
             True,
         )
 
-    def collection(self, name: str, *, ndim: int, per_class: int | None = None) -> Collection:
+    def collection(
+        self, name: str, *, ndim: int, per_class: int | None = None, voxels: int | None = None
+    ) -> Collection:
         """Return a labelled collection, or creatures where it is absent.
 
         Parameters
@@ -154,11 +156,13 @@ class Data:
             Dimension of the creatures that stand in for it.
         per_class
             Number of shapes of each class; all of them by default, six creatures.
+        voxels
+            Number of nodes of a creature.
         """
         folder = self.find(name)
         if folder is None:
             rng = np.random.default_rng(0)
-            pairs = creature_collection(n_per_class=per_class or 6, ndim=ndim, rng=rng)
+            pairs = creature_collection(n_per_class=per_class or 6, ndim=ndim, voxels=voxels, rng=rng)
             shapes, labels = zip(*pairs, strict=True)
             return Collection("creatures", shapes, labels, f"Creatures made here in place of {name}.", False)
         rows = read_labels(folder / "labels.csv")

@@ -76,6 +76,41 @@ class Picture:
     caption: str
 
 
+@dataclass(frozen=True)
+class Table:
+    """Numbers in rows, as words.
+
+    Parameters
+    ----------
+    caption
+        What the table holds.
+    head
+        A title for each column.
+    rows
+        Cells, as many as there are titles; the first names the row.
+
+    Raises
+    ------
+    ParameterError
+        If a row has another number of cells.
+
+    Examples
+    --------
+    >>> len(Table("Scores in percent.", ("code", "FT"), (("SPEM", "98.4"),)).rows)
+    1
+    """
+
+    caption: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.head):
+                msg = f"the row {row} of the table {self.caption!r} needs {len(self.head)} cells"
+                raise ParameterError(msg)
+
+
 @dataclass(frozen=True, eq=False)
 class Finding:
     """What one experiment found.
@@ -88,6 +123,8 @@ class Finding:
         Statements of the paper beside what was measured.
     pictures
         The figures.
+    tables
+        Numbers in rows.
     numbers
         Everything measured, by name: plain numbers, words, lists, dictionaries and arrays.
     """
@@ -95,6 +132,7 @@ class Finding:
     shapes: str
     claims: tuple[Claim, ...] = ()
     pictures: tuple[Picture, ...] = ()
+    tables: tuple[Table, ...] = field(default=(), kw_only=True)
     numbers: Mapping[str, Any] = field(default_factory=dict)
 
 

@@ -36,6 +36,10 @@ def present(make: Callable[[Data], Finding], argv: list[str] | None = None) -> F
     options = parser.parse_args(argv if argv is not None else sys.argv[1:])
     finding = make(Data(options.data, quick=not options.full))
     print(f"Shapes: {finding.shapes}")  # noqa: T201 - the script's own output
+    for table in finding.tables:
+        print(table.caption)  # noqa: T201
+        for row in (table.head, *table.rows):
+            print("  " + "  ".join(row))  # noqa: T201
     for claim in finding.claims:
         note = f" {claim.note}" if claim.note else ""
         print(f"{claim.verdict}: {claim.statement} Paper: {claim.paper}. Ours: {claim.ours}.{note}")  # noqa: T201

@@ -73,7 +73,16 @@ def _item(record: Record) -> str:
             f'style="max-width:100%"><figcaption>{text(caption)}</figcaption></figure>'
             for file, caption in record.pictures
         )
+        tables = "".join(
+            table(text(each.caption), [text(title) for title in each.head], _escaped(each.rows))
+            for each in record.tables
+        )
         rows = [_cells(claim) for claim in record.claims]
         claims = table("Statements", ["statement", "paper", "ours", "verdict"], rows) if rows else ""
-        content = f"<p>{text(record.shapes)} Made in {seconds:.1f} s.</p>{pictures}{claims}"
+        content = f"<p>{text(record.shapes)} Made in {seconds:.1f} s.</p>{pictures}{tables}{claims}"
     return f'<div id="{text(record.item)}">{section(text(record.title), content)}</div>'
+
+
+def _escaped(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Return cells as HTML."""
+    return [[text(cell) for cell in row] for row in rows]

@@ -17,7 +17,7 @@ from spem.errors import ParameterError, SpemError
 from spem.files import write_whole
 from spem.paper.catalogue import Item
 from spem.paper.data import Data
-from spem.paper.findings import Claim, Finding
+from spem.paper.findings import Claim, Finding, Table
 
 RECORD = "finding.json"
 _DPI = 130
@@ -41,6 +41,8 @@ class Record:
         Statements of the paper beside what was measured.
     pictures
         File name and caption of each picture.
+    tables
+        Numbers in rows.
     numbers
         Everything measured, as JSON has it.
     made
@@ -55,6 +57,7 @@ class Record:
     shapes: str = ""
     claims: tuple[Claim, ...] = ()
     pictures: tuple[tuple[str, str], ...] = ()
+    tables: tuple[Table, ...] = ()
     numbers: Mapping[str, Any] | None = None
     made: Mapping[str, Any] | None = None
     failure: str = ""
@@ -116,6 +119,7 @@ def load(item: Item, folder: Path) -> Record | None:
             values["shapes"],
             tuple(Claim(**claim) for claim in values["claims"]),
             tuple((entry["file"], entry["caption"]) for entry in values["pictures"]),
+            tuple(_table(entry) for entry in values["tables"]),
             values["numbers"],
             values["made"],
         )
@@ -172,6 +176,7 @@ def write(item: Item, finding: Finding, folder: Path, made: Mapping[str, Any]) -
         "shapes": finding.shapes,
         "claims": [asdict(claim) for claim in finding.claims],
         "pictures": pictures,
+        "tables": [asdict(table) for table in finding.tables],
         "numbers": plain(finding.numbers),
         "made": dict(made),
     }
@@ -196,6 +201,11 @@ def plain(values: Any) -> Any:
     if isinstance(values, float) and not math.isfinite(values):
         return str(values)
     return values if isinstance(values, (bool, int, float, str)) or values is None else str(values)
+
+
+def _table(entry: Mapping[str, Any]) -> Table:
+    """Return a table as it was before JSON made lists of its tuples."""
+    return Table(entry["caption"], tuple(entry["head"]), tuple(tuple(row) for row in entry["rows"]))
 
 
 def _writer(content: bytes) -> Callable[[Any], Any]:
