@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         SpemError,
     )
     from spem.fields.boundary.sources import Sources
+    from spem.fields.geodesics import inner_distances
     from spem.fields.gradients import source_gradient
     from spem.fields.hyperfield import Hyperfield
     from spem.fields.isocontours import iso_contours, iso_surfaces
@@ -102,6 +103,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "evaluate",
     "field",
     "fuse",
+    "inner_distances",
     "iso_contours",
     "iso_surfaces",
     "joint_parts",
@@ -172,6 +174,7 @@ _HOME = {
     "evaluate": "spem.collections",
     "field": "spem.api.fields",
     "fuse": "spem.retrieval.distances",
+    "inner_distances": "spem.fields.geodesics",
     "iso_contours": "spem.fields.isocontours",
     "iso_surfaces": "spem.fields.isocontours",
     "joint_parts": "spem.decomposition.joint",

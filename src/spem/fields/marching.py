@@ -1,0 +1,266 @@
+"""Distances along the graph of the nodes: straight where the way is free, by fast marching round corners."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+# States of a node in `place`; others hold its place in the heap.
+_SETTLED = -2
+_FAR = -1
+
+
+@njit(cache=True, nogil=True)
+def see(
+    index: NDArray[np.int32],
+    neighbours: NDArray[np.int32],
+    spacing: NDArray[np.float64],
+    seed: int,
+    offset: NDArray[np.float64],
+    distance: NDArray[np.float64],
+) -> None:
+    """Lower `distance`, in place, to the length of the straight way where that is free.
+
+    The way from the seed to a node is free when every voxel face that it crosses is an uncut edge between
+    two nodes. Only nodes beside others in sight are tried.
+
+    Parameters
+    ----------
+    index
+        ``(n_nodes, d)`` place of each node in its grid.
+    neighbours
+        ``(n_nodes, 2 d)`` table of `Domain.neighbours`.
+    spacing
+        ``(d,)`` length of the edges.
+    seed
+        The node that looks.
+    offset
+        ``(d,)`` where the distance is measured from, less the position of the seed.
+    distance
+        ``(n_nodes,)``; infinite where nothing is known yet.
+    """
+    n, d = index.shape
+    tried = np.zeros(n, np.bool_)
+    queue = np.empty(n, np.int32)
+    corner = np.empty(1 << d, np.int32)
+    queue[0], tried[seed] = seed, True
+    first, last = 0, 1
+    while first < last:
+        node = queue[first]
+        first += 1
+        squared = 0.0
+        for a in range(d):
+            squared += ((index[node, a] - index[seed, a]) * spacing[a] - offset[a]) ** 2
+        distance[node] = min(distance[node], np.sqrt(squared))
+        for k in range(2 * d):
+            near = neighbours[node, k]
+            if near < n and not tried[near]:
+                tried[near] = True
+                if _in_sight(index, neighbours, seed, near, corner):
+                    queue[last] = near
+                    last += 1
+
+
+@njit(cache=True, nogil=True)
+def _in_sight(
+    index: NDArray[np.int32],
+    neighbours: NDArray[np.int32],
+    start: int,
+    end: int,
+    corner: NDArray[np.int32],
+) -> bool:
+    """Walk the voxels on the straight line from node to node; False where a face is no uncut edge."""
+    d, n = index.shape[1], index.shape[0]
+    length = np.abs(index[end] - index[start])
+    crossed = np.zeros(d, np.int64)
+    node = start
+    for _ in range(length.sum()):
+        # axis a is crossed next at (2 crossed + 1) / (2 length); equal ones at a corner of voxels, at once
+        ties, lead = 0, -1
+        for a in range(d):
+            if crossed[a] == length[a]:
+                continue
+            order = 1
+            if lead >= 0:
+                order = (2 * crossed[lead] + 1) * length[a] - (2 * crossed[a] + 1) * length[lead]
+            if order > 0:
+                ties, lead = 1 << a, a
+            elif order == 0:
+                ties |= 1 << a
+        corner[0] = node
+        for part in range(1, ties + 1):
+            if part & ties != part:
+                continue
+            corner[part] = n
+            for a in range(d):
+                if part >> a & 1 and corner[part ^ (1 << a)] < n and corner[part] == n:
+                    way = 2 * a + int(index[end, a] > index[start, a])
+                    corner[part] = neighbours[corner[part ^ (1 << a)], way]
+        node = corner[ties]
+        if node == n:
+            return False
+        for a in range(d):
+            crossed[a] += ties >> a & 1
+        if node == end:
+            return True
+    return True
+
+
+@njit(cache=True, nogil=True)
+def march(
+    neighbours: NDArray[np.int32], spacing: NDArray[np.float64], order: int, distance: NDArray[np.float64]
+) -> None:
+    """Solve the eikonal equation |∇u| = 1 outward from the nodes of finite distance, in place.
+
+    Upwind differences over settled neighbours, of second order along an axis where two in a row are settled
+    and the farther one is no larger (Sethian 1999), else of first.
+
+    Parameters
+    ----------
+    neighbours
+        ``(n_nodes, 2 d)`` table of `Domain.neighbours`.
+    spacing
+        ``(d,)`` length of the edges.
+    order
+        1 or 2, the highest order of the differences.
+    distance
+        ``(n_nodes,)`` distance where it is given, infinite elsewhere; it stays so where no edge leads.
+    """
+    n, directions = neighbours.shape
+    heap = np.empty(n, np.int32)
+    place = np.full(n, _FAR, np.int32)
+    value, weight = np.empty(directions // 2), np.empty(directions // 2)
+    size = 0
+    for node in range(n):
+        if distance[node] < np.inf:
+            place[node] = _SETTLED
+    for node in range(n):
+        if place[node] != _SETTLED:
+            size = _update(neighbours, spacing, order, node, distance, heap, place, size, value, weight)
+    while size > 0:
+        node = heap[0]
+        size -= 1
+        place[node] = _SETTLED
+        if size > 0:
+            _sift_down(heap, place, distance, heap[size], size)
+        for k in range(directions):
+            near = neighbours[node, k]
+            if near < n and place[near] != _SETTLED:
+                size = _update(neighbours, spacing, order, near, distance, heap, place, size, value, weight)
+
+
+@njit(cache=True, nogil=True)
+def _update(
+    neighbours: NDArray[np.int32],
+    spacing: NDArray[np.float64],
+    order: int,
+    node: int,
+    distance: NDArray[np.float64],
+    heap: NDArray[np.int32],
+    place: NDArray[np.int32],
+    size: int,
+    value: NDArray[np.float64],
+    weight: NDArray[np.float64],
+) -> int:
+    """Lower the trial distance of a node and its place in the heap; return the heap's size."""
+    axes = _upwind(neighbours, spacing, order, node, distance, place, value, weight)
+    trial = _solve(value[:axes], weight[:axes])
+    if trial < distance[node]:
+        distance[node] = trial
+        if place[node] == _FAR:
+            heap[size] = node
+            place[node] = size
+            size += 1
+        _sift_up(heap, place, distance, place[node])
+    return size
+
+
+@njit(cache=True, nogil=True)
+def _upwind(
+    neighbours: NDArray[np.int32],
+    spacing: NDArray[np.float64],
+    order: int,
+    node: int,
+    distance: NDArray[np.float64],
+    place: NDArray[np.int32],
+    value: NDArray[np.float64],
+    weight: NDArray[np.float64],
+) -> int:
+    """Fill in the terms weight² (u − value)² of the axes that have a settled neighbour, least value first."""
+    n, axes = neighbours.shape[0], 0
+    for a in range(spacing.size):
+        least, term, scale = np.inf, 0.0, 0.0
+        for k in (2 * a, 2 * a + 1):
+            near = neighbours[node, k]
+            if near == n or place[near] != _SETTLED or distance[near] >= least:
+                continue
+            least = distance[near]
+            term, scale = least, 1.0 / spacing[a]
+            next_one = neighbours[near, k]
+            if order == 2 and next_one < n and place[next_one] == _SETTLED and distance[next_one] <= least:
+                term, scale = (4.0 * least - distance[next_one]) / 3.0, 1.5 / spacing[a]
+        if least < np.inf:
+            slot = axes
+            while slot > 0 and value[slot - 1] > term:
+                value[slot], weight[slot] = value[slot - 1], weight[slot - 1]
+                slot -= 1
+            value[slot], weight[slot] = term, scale
+            axes += 1
+    return axes
+
+
+@njit(cache=True, nogil=True)
+def _solve(value: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
+    """Return the largest root u of Σ weight² (u − value)² = 1 over the axes whose value it exceeds."""
+    trial = np.inf
+    squares, linear, constant = 0.0, 0.0, -1.0
+    for a in range(value.size):
+        if value[a] >= trial:
+            break
+        # relative to the first value: squares of large distances would cancel
+        step = value[a] - value[0]
+        squares += weight[a] ** 2
+        linear += weight[a] ** 2 * step
+        constant += (weight[a] * step) ** 2
+        root = max(linear**2 - squares * constant, 0.0)
+        trial = value[0] + (linear + np.sqrt(root)) / squares
+    return trial
+
+
+@njit(cache=True, nogil=True)
+def _sift_up(
+    heap: NDArray[np.int32], place: NDArray[np.int32], distance: NDArray[np.float64], at: int
+) -> None:
+    """Move a node toward the root of the heap, past those that are farther."""
+    node = heap[at]
+    while at > 0:
+        above = (at - 1) // 2
+        if distance[heap[above]] <= distance[node]:
+            break
+        heap[at] = heap[above]
+        place[heap[at]] = at
+        at = above
+    heap[at] = node
+    place[node] = at
+
+
+@njit(cache=True, nogil=True)
+def _sift_down(
+    heap: NDArray[np.int32], place: NDArray[np.int32], distance: NDArray[np.float64], node: int, size: int
+) -> None:
+    """Put a node at the root of the heap and move it down, past those that are nearer."""
+    at = 0
+    while True:
+        below = 2 * at + 1
+        if below >= size:
+            break
+        if below + 1 < size and distance[heap[below + 1]] < distance[heap[below]]:
+            below += 1
+        if distance[heap[below]] >= distance[node]:
+            break
+        heap[at] = heap[below]
+        place[heap[at]] = at
+        at = below
+    heap[at] = node
+    place[node] = at
