@@ -15,12 +15,12 @@ from scipy.spatial import KDTree
 from sklearn.metrics import adjusted_rand_score, rand_score
 
 import spem
-from _conditions import Mask, conditions, limbs
 from _table import Benchmark, Row, data_root, timed
 from spem.decomposition.choice import error_curve
 from spem.decomposition.division import boundary_parts, region_parts
 from spem.decomposition.joint import joint_parts
 from spem.fields.superposition.fields import SourceFields
+from spem.paper.perturbations import Mask, conditions, limbs
 
 Setting = tuple[str, int]
 Scores = tuple[float, float, float]
