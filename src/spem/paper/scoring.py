@@ -17,7 +17,7 @@ from spem.codes.features import node_features, sweep_bands
 from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.codes.sources import read_shapes
-from spem.codes.workers import run_all
+from spem.codes.workers import count_processes, run_all
 from spem.errors import ReadError, SpemError
 from spem.paper.data import Collection
 from spem.retrieval.distances import correlation_distance
@@ -104,7 +104,9 @@ def features_of(items: Sequence[Path | Shape], settings: Settings) -> tuple[Band
     """
     work = partial(_features, items=tuple(items), settings=settings)
     found: dict[int, Bands] = {}
-    for index, bands, reason in run_all(work, range(len(items)), min(cpu_count() or 1, len(items))):
+    for index, bands, reason in run_all(
+        work, range(len(items)), min(cpu_count() or 1, count_processes(len(items)))
+    ):
         if bands is None:
             msg = f"{items[index]}: no features ({reason}); mend the file or take it out of the collection"
             raise ReadError(msg)
