@@ -42,8 +42,10 @@ if TYPE_CHECKING:
     from spem.fields.solvers.cg import ConjugateGradient
     from spem.fields.solvers.direct import Direct
     from spem.fields.solvers.explicit import ExplicitIteration
+    from spem.fields.solvers.lanczos import BlockLanczos
     from spem.fields.solvers.protocol import Solution
     from spem.fields.solvers.sweep import Sweep
+    from spem.fields.spectrum import Spectrum, solve_spectrum
     from spem.fields.streamlines import Streamlines, source_streamlines
     from spem.fields.superposition.fields import SourceFields
     from spem.fields.superposition.hyperfield import SourceHyperfield
@@ -59,6 +61,7 @@ __version__ = "0.1.0"
 
 __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three lists
     "Answer",
+    "BlockLanczos",
     "Clusters",
     "Codes",
     "ConjugateGradient",
@@ -89,6 +92,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "SourceFields",
     "SourceHyperfield",
     "Sources",
+    "Spectrum",
     "SpemError",
     "Streamlines",
     "Sweep",
@@ -116,6 +120,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "read_all",
     "search",
     "signed_distance_shape",
+    "solve_spectrum",
     "source_correlation",
     "source_fields",
     "source_gradient",
@@ -130,6 +135,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
 # Public name -> module that defines it; each is imported when it is first used.
 _HOME = {
     "Answer": "spem.retrieval.ranking",
+    "BlockLanczos": "spem.fields.solvers.lanczos",
     "Clusters": "spem.decomposition.clusters",
     "Codes": "spem.codes.codes",
     "ConjugateGradient": "spem.fields.solvers.cg",
@@ -160,6 +166,7 @@ _HOME = {
     "SourceFields": "spem.fields.superposition.fields",
     "SourceHyperfield": "spem.fields.superposition.hyperfield",
     "Sources": "spem.fields.boundary.sources",
+    "Spectrum": "spem.fields.spectrum",
     "SpemError": "spem.errors",
     "Streamlines": "spem.fields.streamlines",
     "Sweep": "spem.fields.solvers.sweep",
@@ -187,6 +194,7 @@ _HOME = {
     "read_all": "spem.shapes.read",
     "search": "spem.collections",
     "signed_distance_shape": "spem.shapes.levels",
+    "solve_spectrum": "spem.fields.spectrum",
     "source_correlation": "spem.decomposition.interactions",
     "source_fields": "spem.api.parts",
     "source_gradient": "spem.fields.gradients",
