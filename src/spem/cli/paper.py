@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from spem.cli.options import Json
-from spem.cli.output import check_folder, counted, print_json, print_table
+from spem.cli.output import check_folder, complain, counted, print_json, print_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from spem.paper.catalogue import Item
+    from spem.paper.data import Data
     from spem.paper.runs import Record
 
 REPORT = "index.html"
@@ -49,6 +50,7 @@ def paper(
       spem paper all --quick -o out
     """  # noqa: D301
     from spem.paper.catalogue import ITEMS, choose
+    from spem.paper.data import Data
 
     if not items:
         _list(ITEMS, json=json)
@@ -56,8 +58,13 @@ def paper(
     chosen = choose(items)
     folder = _data_folder(data)
     check_folder(output)
-    records = _run(chosen, folder, output, quick=quick, again=again, quiet=json)
-    _finish(records, output, json=json)
+    shapes = Data(folder, quick)
+    try:
+        records = _run(chosen, shapes, output, again=again, quiet=json)
+    except KeyboardInterrupt:
+        msg = f"interrupted; what is made is kept in {output}, and the same command goes on from there"
+        raise KeyboardInterrupt(msg) from None
+    _finish(records, shapes, output, json=json)
 
 
 def _list(items: Sequence[Item], *, json: bool) -> None:
@@ -87,15 +94,15 @@ def _data_folder(data: Path | None) -> Path | None:
             raise ParameterError(msg)
         return data
     named = os.environ.get("SPEM_DATA")
-    return Path(named) if named and Path(named).is_dir() else None
+    if named and not Path(named).is_dir():
+        complain(f"SPEM_DATA: {named} is no folder; going on with shapes made here")
+        return None
+    return Path(named) if named else None
 
 
-def _run(
-    items: Sequence[Item], data: Path | None, output: Path, *, quick: bool, again: bool, quiet: bool
-) -> list[Record]:
+def _run(items: Sequence[Item], data: Data, output: Path, *, again: bool, quiet: bool) -> list[Record]:
     """Make the items; each tells what it found as soon as it is there."""
     from spem.cli.progress import Bar
-    from spem.paper.data import Data
     from spem.paper.runs import run
 
     bar, done = Bar(), 0
@@ -117,10 +124,10 @@ def _run(
 
     with bar:
         bar.advance("items", 0, len(items))
-        return run(items, Data(data, quick), output, again=again, tell=tell)
+        return run(items, data, output, again=again, tell=tell)
 
 
-def _finish(records: Sequence[Record], output: Path, *, json: bool) -> None:
+def _finish(records: Sequence[Record], data: Data, output: Path, *, json: bool) -> None:
     """Write the report on all that is there, say where it is, and fail where something could not be made."""
     from dataclasses import asdict
 
@@ -129,12 +136,15 @@ def _finish(records: Sequence[Record], output: Path, *, json: bool) -> None:
     from spem.paper.runs import load_all
 
     made = {record.item: record for record in load_all(ITEMS, output)} | {r.item: r for r in records}
-    report = write_report(output / REPORT, [made[item.name] for item in ITEMS if item.name in made])
+    kept = [item for item in ITEMS if item.name in made]
+    absent = sorted({name for item in kept for name in item.needs if data.find(name) is None})
+    notes = [data.absent(name) for name in absent]
+    report = write_report(output / REPORT, [made[item.name] for item in kept], notes)
     failed = [record for record in records if record.failure]
     if json:
         print_json([asdict(record) for record in records])
     else:
         typer.echo(f"report: {report}")
     if failed:
-        typer.echo(f"spem: {counted(len(failed), 'item')} could not be made", err=True)
+        complain(f"{counted(len(failed), 'item')} could not be made")
         raise typer.Exit(2 if len(failed) == len(records) else 1)

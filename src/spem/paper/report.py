@@ -13,7 +13,7 @@ from spem.paper.runs import Record
 from spem.plots.markup import data_uri, page, section, table, text
 
 
-def write_report(path: Path, records: Sequence[Record]) -> Path:
+def write_report(path: Path, records: Sequence[Record], absent: Sequence[str] = ()) -> Path:
     """Write the page.
 
     Parameters
@@ -22,6 +22,8 @@ def write_report(path: Path, records: Sequence[Record]) -> Path:
         The file; an existing one is replaced in one step.
     records
         What was made, in the order of the paper.
+    absent
+        What collections are missing and how to get them, a sentence each.
 
     Raises
     ------
@@ -36,7 +38,9 @@ def write_report(path: Path, records: Sequence[Record]) -> Path:
     summary = text(
         f"{len(records)} figures, tables and claims; of the statements judged: {', '.join(parts)}."
     )
-    body = _overview(records) + "".join(_item(record) for record in records)
+    missing = "".join(f"<li>{text(note)}</li>" for note in absent)
+    body = section("Absent collections", f"<ul>{missing}</ul>" if missing else "")
+    body += _overview(records) + "".join(_item(record) for record in records)
     title = "Screened Poisson hyperfields: the paper reproduced"
     whole = page(title, summary, body, style="report.css", script="report.js").encode()
     write_whole(path, lambda file: file.write(whole))

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import spem
-from spem.errors import ParameterError, SpemError
+from spem.codes.workers import one_line
+from spem.errors import ParameterError
 from spem.files import write_whole
 from spem.paper.catalogue import Item
 from spem.paper.data import Data
@@ -138,8 +139,8 @@ def _make(item: Item, data: Data, folder: Path) -> Record:
     start = time.perf_counter()
     try:
         finding = item.make(data)
-    except SpemError as error:
-        return Record(item.name, item.words[0], folder / item.name, failure=str(error))
+    except Exception as error:  # noqa: BLE001 - the rest of a long run goes on
+        return Record(item.name, item.words[0], folder / item.name, failure=one_line(error))
     made = _origin(item, data) | {"seconds": round(time.perf_counter() - start, 2)}
     write(item, finding, folder, made)
     record = load(item, folder)
