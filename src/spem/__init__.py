@@ -35,7 +35,8 @@ if TYPE_CHECKING:
         SpemError,
     )
     from spem.fields.boundary.sources import Sources
-    from spem.fields.geodesics import inner_distances
+    from spem.fields.boundary_distance import distance_to_boundary, screened_distance
+    from spem.fields.geodesics import inner_distances, source_distances
     from spem.fields.gradients import source_gradient
     from spem.fields.hyperfield import Hyperfield
     from spem.fields.isocontours import iso_contours, iso_surfaces
@@ -102,6 +103,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "cluster_interactions",
     "correlation_distance",
     "creatures",
+    "distance_to_boundary",
     "encode",
     "error_curve",
     "evaluate",
@@ -118,10 +120,12 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "precision_recall",
     "read",
     "read_all",
+    "screened_distance",
     "search",
     "signed_distance_shape",
     "solve_spectrum",
     "source_correlation",
+    "source_distances",
     "source_fields",
     "source_gradient",
     "source_node_correlation",
@@ -176,6 +180,7 @@ _HOME = {
     "cluster_interactions": "spem.decomposition.clusters",
     "correlation_distance": "spem.retrieval.distances",
     "creatures": "spem.shapes.creatures",
+    "distance_to_boundary": "spem.fields.boundary_distance",
     "encode": "spem.collections",
     "error_curve": "spem.decomposition.choice",
     "evaluate": "spem.collections",
@@ -192,10 +197,12 @@ _HOME = {
     "precision_recall": "spem.retrieval.evaluation",
     "read": "spem.shapes.read",
     "read_all": "spem.shapes.read",
+    "screened_distance": "spem.fields.boundary_distance",
     "search": "spem.collections",
     "signed_distance_shape": "spem.shapes.levels",
     "solve_spectrum": "spem.fields.spectrum",
     "source_correlation": "spem.decomposition.interactions",
+    "source_distances": "spem.fields.geodesics",
     "source_fields": "spem.api.parts",
     "source_gradient": "spem.fields.gradients",
     "source_node_correlation": "spem.decomposition.interactions",

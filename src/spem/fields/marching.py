@@ -1,4 +1,4 @@
-"""Distances along the graph of the nodes: straight where the way is free, by fast marching round corners."""
+"""Fronts that spread over the graph of the nodes, nearest first: fast marching, and nearest points."""
 
 from __future__ import annotations
 
@@ -9,102 +9,6 @@ from numpy.typing import NDArray
 # States of a node in `place`; others hold its place in the heap.
 _SETTLED = -2
 _FAR = -1
-
-
-@njit(cache=True, nogil=True)
-def see(
-    index: NDArray[np.int32],
-    neighbours: NDArray[np.int32],
-    spacing: NDArray[np.float64],
-    seed: int,
-    offset: NDArray[np.float64],
-    distance: NDArray[np.float64],
-) -> None:
-    """Lower `distance`, in place, to the length of the straight way where that is free.
-
-    The way from the seed to a node is free when every voxel face that it crosses is an uncut edge between
-    two nodes. Only nodes beside others in sight are tried.
-
-    Parameters
-    ----------
-    index
-        ``(n_nodes, d)`` place of each node in its grid.
-    neighbours
-        ``(n_nodes, 2 d)`` table of `Domain.neighbours`.
-    spacing
-        ``(d,)`` length of the edges.
-    seed
-        The node that looks.
-    offset
-        ``(d,)`` where the distance is measured from, less the position of the seed.
-    distance
-        ``(n_nodes,)``; infinite where nothing is known yet.
-    """
-    n, d = index.shape
-    tried = np.zeros(n, np.bool_)
-    queue = np.empty(n, np.int32)
-    corner = np.empty(1 << d, np.int32)
-    queue[0], tried[seed] = seed, True
-    first, last = 0, 1
-    while first < last:
-        node = queue[first]
-        first += 1
-        squared = 0.0
-        for a in range(d):
-            squared += ((index[node, a] - index[seed, a]) * spacing[a] - offset[a]) ** 2
-        distance[node] = min(distance[node], np.sqrt(squared))
-        for k in range(2 * d):
-            near = neighbours[node, k]
-            if near < n and not tried[near]:
-                tried[near] = True
-                if _in_sight(index, neighbours, seed, near, corner):
-                    queue[last] = near
-                    last += 1
-
-
-@njit(cache=True, nogil=True)
-def _in_sight(
-    index: NDArray[np.int32],
-    neighbours: NDArray[np.int32],
-    start: int,
-    end: int,
-    corner: NDArray[np.int32],
-) -> bool:
-    """Walk the voxels on the straight line from node to node; False where a face is no uncut edge."""
-    d, n = index.shape[1], index.shape[0]
-    length = np.abs(index[end] - index[start])
-    crossed = np.zeros(d, np.int64)
-    node = start
-    for _ in range(length.sum()):
-        # axis a is crossed next at (2 crossed + 1) / (2 length); equal ones at a corner of voxels, at once
-        ties, lead = 0, -1
-        for a in range(d):
-            if crossed[a] == length[a]:
-                continue
-            order = 1
-            if lead >= 0:
-                order = (2 * crossed[lead] + 1) * length[a] - (2 * crossed[a] + 1) * length[lead]
-            if order > 0:
-                ties, lead = 1 << a, a
-            elif order == 0:
-                ties |= 1 << a
-        corner[0] = node
-        for part in range(1, ties + 1):
-            if part & ties != part:
-                continue
-            corner[part] = n
-            for a in range(d):
-                if part >> a & 1 and corner[part ^ (1 << a)] < n and corner[part] == n:
-                    way = 2 * a + int(index[end, a] > index[start, a])
-                    corner[part] = neighbours[corner[part ^ (1 << a)], way]
-        node = corner[ties]
-        if node == n:
-            return False
-        for a in range(d):
-            crossed[a] += ties >> a & 1
-        if node == end:
-            return True
-    return True
 
 
 @njit(cache=True, nogil=True)
@@ -264,3 +168,92 @@ def _sift_down(
         at = below
     heap[at] = node
     place[node] = at
+
+
+@njit(cache=True, nogil=True)
+def spread(
+    position: NDArray[np.float64],
+    neighbours: NDArray[np.int32],
+    starts: NDArray[np.int64],
+    feet: NDArray[np.float64],
+    beside: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """Find the nearest foot of each node: among those of its neighbours, then along the feet downhill.
+
+    Parameters
+    ----------
+    position
+        ``(n_nodes, d)`` coordinates of the nodes.
+    neighbours
+        ``(n_nodes, 2 d)`` table of `Domain.neighbours`.
+    starts
+        ``(n_feet,)`` node that has each foot to begin with.
+    feet
+        ``(n_feet, d)`` coordinates of the feet.
+    beside
+        ``(n_feet, k)`` numbers of feet beside each foot.
+
+    Returns
+    -------
+    foot
+        ``(n_nodes,)`` number of the foot; -1 where none can be reached.
+    """
+    n, directions = neighbours.shape
+    heap = np.empty(n, np.int32)
+    place = np.full(n, _FAR, np.int32)
+    squared, foot = np.full(n, np.inf), np.full(n, -1)
+    size = 0
+    for e in range(starts.size):
+        size = _offer(position, feet, starts[e], e, squared, foot, heap, place, size)
+    while size > 0:
+        node = heap[0]
+        size -= 1
+        place[node] = _FAR
+        if size > 0:
+            _sift_down(heap, place, squared, heap[size], size)
+        for k in range(directions):
+            near = neighbours[node, k]
+            if near < n:
+                size = _offer(position, feet, near, foot[node], squared, foot, heap, place, size)
+    for node in range(n):
+        before = -2
+        while foot[node] != before:
+            before = foot[node]
+            for e in beside[before] if before >= 0 else beside[0, :0]:
+                trial = _squared(position[node], feet[e])
+                if trial < squared[node]:
+                    squared[node], foot[node] = trial, e
+    return foot
+
+
+@njit(cache=True, nogil=True)
+def _squared(here: NDArray[np.float64], there: NDArray[np.float64]) -> float:
+    """Square of the distance between two points."""
+    total = 0.0
+    for a in range(here.size):
+        total += (here[a] - there[a]) ** 2
+    return total
+
+
+@njit(cache=True, nogil=True)
+def _offer(
+    position: NDArray[np.float64],
+    feet: NDArray[np.float64],
+    node: int,
+    candidate: int,
+    squared: NDArray[np.float64],
+    foot: NDArray[np.int64],
+    heap: NDArray[np.int32],
+    place: NDArray[np.int32],
+    size: int,
+) -> int:
+    """Let a node take a foot that is nearer than its own; return the heap's size."""
+    trial = _squared(position[node], feet[candidate])
+    if trial < squared[node]:
+        squared[node], foot[node] = trial, candidate
+        if place[node] == _FAR:
+            heap[size] = node
+            place[node] = size
+            size += 1
+        _sift_up(heap, place, squared, place[node])
+    return size
