@@ -1,0 +1,59 @@
+"""Links from types as the code writes them to the pages of the public names."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from docutils import nodes
+from sphinx.addnodes import pending_xref
+from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
+
+import spem
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Resolve what Sphinx cannot, and leave out what scikit-learn adds to its estimators."""
+    app.connect("missing-reference", _resolve)
+    app.connect("autodoc-skip-member", _skip)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _resolve(
+    app: Sphinx, env: BuildEnvironment, node: pending_xref, content: nodes.TextElement
+) -> nodes.Node | None:
+    """Link a public name that is meant by its home or without its package; leave other types as text."""
+    if node.get("refdomain") != "py":
+        return None
+    target = str(node.get("reftarget", ""))
+    domain = env.domains.python_domain
+    for name in _public(target):
+        if name in domain.objects:
+            role = domain.role_for_objtype(domain.objects[name].objtype)
+            return domain.resolve_xref(
+                env, node["refdoc"], app.builder, role or "obj", name, node, content
+            )
+    # Types of other packages, and those of ours that are not promised, have no page here.
+    return content if node.get("reftype") in ("class", "data", "exc") else None
+
+
+def _public(target: str) -> list[str]:
+    """Return the public names that a dotted name may mean.
+
+    Examples
+    --------
+    >>> _public("spem.shapes.shape.Shape"), _public("Shape.from_mask"), _public("inf")
+    (['spem.Shape'], ['spem.Shape.from_mask'], [])
+    """
+    for name, module in spem._HOME.items():
+        home = f"{module}.{name}"
+        if target == home or target.startswith(f"{home}."):
+            return [f"spem.{name}{target.removeprefix(home)}"]
+    first = target.partition(".")[0]
+    return [f"spem.{target}"] if first in spem.__all__ else []
+
+
+def _skip(app: Sphinx, kind: str, name: str, member: Any, skip: bool, options: Any) -> bool | None:
+    """Leave out methods that scikit-learn makes of the signatures of others."""
+    return True if re.fullmatch(r"set_\w+_request", name) else None
