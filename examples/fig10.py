@@ -1,0 +1,100 @@
+"""
+Figure 10: star polygons of one circle, and of one inner radius
+===============================================================
+
+The star polygons {n/4}, n = 9 to 20, all have their points on one circle; with n they become rounder and
+deeper, and their bases Φ₁ to Φ₆ over ρ adapt (4.2.1). Rescaled to one inner radius, the largest distance from
+a node to the boundary, their bases nearly coincide: what is left to tell them apart is in the maps.
+"""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import spem
+from spem.paper.consistency import PAPER_RADIUS, PAPER_RHO, RTOL, basis_cosines, largest_subspace_angle, pairs
+from spem.paper.data import Data
+from spem.paper.findings import Finding, Picture, judged
+from spem.paper.present import present
+from spem.paper.scaling import scaled
+from spem.plots.basis_grid import draw_bases
+from spem.plots.fields import draw_outline
+from spem.plots.style import bare, new_figure
+from spem.shapes.distance import signed_distance
+
+N_MAPS = 6
+POINTS = range(9, 21)
+RADIUS = 40.0
+# Bases nearly coincide where every angle has a cosine of at least this.
+NEAR = 0.95
+
+
+def make(data: Data) -> Finding:
+    """Compare the bases of stars before and after rescaling."""
+    stars = [spem.synthetic.star_polygon(n, 4, radius=RADIUS, spacing=1.0) for n in POINTS]
+    inner = [float(signed_distance(star).max()) for star in stars]
+    rescaled = [scaled(star, PAPER_RADIUS / depth) for star, depth in zip(stars, inner, strict=True)]
+    before, after = (
+        [spem.maps(star, N_MAPS, rho=PAPER_RHO, rtol=RTOL) for star in several]
+        for several in (stars, rescaled)
+    )
+    angles = [np.degrees(np.arccos(pairs(basis_cosines(maps)).min(axis=0))) for maps in (before, after)]
+    spaces = [largest_subspace_angle(maps) for maps in (before, after)]
+    words = [", ".join(f"{angle:.1f}" for angle in several) for several in angles]
+    claims = (
+        judged(
+            "Rescaled to one inner radius, the first six eigenvectors of star polygons are almost identical "
+            "(4.2.1, Fig. 10).",
+            "almost identical",
+            f"largest angle of two stars, Φ₁ to Φ₆: {words[1]}°; of the spaces they span: {spaces[1]:.1f}°",
+            bool(np.cos(np.radians(angles[1].max())) >= NEAR),
+            note=f"Almost identical is tested as: every cosine at least {NEAR}. The stars with the fewest "
+            "points, whose core is small beside its points, are farthest from the others.",
+        ),
+        judged(
+            "On one circle, the eigenvectors alter with the distances inside the stars (4.2.1, Fig. 10).",
+            "altered",
+            f"largest angle Φ₁ to Φ₆: {words[0]}°; of the spaces: {spaces[0]:.1f}°; inner radii "
+            f"{min(inner):.0f} to {max(inner):.0f} px",
+            bool((angles[0] > angles[1]).all() and spaces[0] > spaces[1]),
+            note="Some basis vector differs more after rescaling than before.",
+        ),
+    )
+    numbers = {
+        "n": list(POINTS),
+        "inner_radius_px": inner,
+        "largest_angle_before_deg": angles[0],
+        "largest_angle_after_deg": angles[1],
+        "subspace_angle_before_deg": spaces[0],
+        "subspace_angle_after_deg": spaces[1],
+    }
+    pictures = (
+        Picture("stars", draw_stars(stars), "The star polygons {n/4}, points on one circle."),
+        Picture(
+            "bases", draw(before, after), "Φₙ before (left) and after rescaling to one inner radius (right)."
+        ),
+    )
+    source = f"Star polygons made here as in the paper, of circumradius {RADIUS:g} px; ρ from 2 to 30 px."
+    return Finding(source, claims, pictures, numbers)
+
+
+def draw_stars(stars: list[spem.Shape]) -> Figure:
+    """Draw the outlines of the stars in a row."""
+    figure = new_figure(9.4, 0.95)
+    for ax, star, n in zip(figure.subplots(1, len(stars)), stars, POINTS, strict=True):
+        draw_outline(star, ax)
+        bare(ax, f"{{{n}/4}}")
+    return figure
+
+
+def draw(before: list[spem.Maps], after: list[spem.Maps]) -> Figure:
+    """Draw the bases before and after, side by side."""
+    figure = new_figure(9.4, 3.4)
+    titles = ("one circle", f"one inner radius, {PAPER_RADIUS:g} px")
+    grid = figure.add_gridspec(1, 2)
+    for part, maps, title in zip((grid[0], grid[1]), (before, after), titles, strict=True):
+        draw_bases(maps, POINTS, figure.add_subfigure(part), label="n", title=title)
+    return figure
+
+
+if __name__ == "__main__":
+    finding = present(make)
