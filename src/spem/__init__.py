@@ -23,7 +23,15 @@ if TYPE_CHECKING:
     from spem.decomposition.parts import Parts
     from spem.decomposition.sparse_coding import NonnegativeSparseCoding
     from spem.decomposition.transfer import vertex_labels
+    from spem.embedding.heat import diffusion_distance, heat_kernel
     from spem.embedding.maps import Maps
+    from spem.embedding.signatures import (
+        heat_kernel_signature,
+        scale_invariant_signature,
+        shared_times,
+        shared_values,
+        wave_kernel_signature,
+    )
     from spem.errors import (
         ConvergenceError,
         LabelError,
@@ -103,12 +111,15 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "cluster_interactions",
     "correlation_distance",
     "creatures",
+    "diffusion_distance",
     "distance_to_boundary",
     "encode",
     "error_curve",
     "evaluate",
     "field",
     "fuse",
+    "heat_kernel",
+    "heat_kernel_signature",
     "inner_distances",
     "iso_contours",
     "iso_surfaces",
@@ -120,8 +131,11 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "precision_recall",
     "read",
     "read_all",
+    "scale_invariant_signature",
     "screened_distance",
     "search",
+    "shared_times",
+    "shared_values",
     "signed_distance_shape",
     "solve_spectrum",
     "source_correlation",
@@ -134,6 +148,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "sweep",
     "synthetic",
     "vertex_labels",
+    "wave_kernel_signature",
 ]
 
 # Public name -> module that defines it; each is imported when it is first used.
@@ -180,12 +195,15 @@ _HOME = {
     "cluster_interactions": "spem.decomposition.clusters",
     "correlation_distance": "spem.retrieval.distances",
     "creatures": "spem.shapes.creatures",
+    "diffusion_distance": "spem.embedding.heat",
     "distance_to_boundary": "spem.fields.boundary_distance",
     "encode": "spem.collections",
     "error_curve": "spem.decomposition.choice",
     "evaluate": "spem.collections",
     "field": "spem.api.fields",
     "fuse": "spem.retrieval.distances",
+    "heat_kernel": "spem.embedding.heat",
+    "heat_kernel_signature": "spem.embedding.signatures",
     "inner_distances": "spem.fields.geodesics",
     "iso_contours": "spem.fields.isocontours",
     "iso_surfaces": "spem.fields.isocontours",
@@ -197,8 +215,11 @@ _HOME = {
     "precision_recall": "spem.retrieval.evaluation",
     "read": "spem.shapes.read",
     "read_all": "spem.shapes.read",
+    "scale_invariant_signature": "spem.embedding.signatures",
     "screened_distance": "spem.fields.boundary_distance",
     "search": "spem.collections",
+    "shared_times": "spem.embedding.signatures",
+    "shared_values": "spem.embedding.signatures",
     "signed_distance_shape": "spem.shapes.levels",
     "solve_spectrum": "spem.fields.spectrum",
     "source_correlation": "spem.decomposition.interactions",
@@ -211,6 +232,7 @@ _HOME = {
     "sweep": "spem.api.fields",
     "synthetic": "spem.shapes.synthetic",
     "vertex_labels": "spem.decomposition.transfer",
+    "wave_kernel_signature": "spem.embedding.signatures",
 }
 
 # Type checkers read the imports above, and would take any name for one of this function's.
