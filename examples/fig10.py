@@ -68,7 +68,7 @@ def make(data: Data) -> Finding:
         "subspace_angle_after_deg": spaces[1],
     }
     pictures = (
-        Picture("stars", draw_stars(stars), "The star polygons {n/4}, points on one circle."),
+        Picture("stars", draw_stars(), "The star polygons {n/4}, points on one circle."),
         Picture(
             "bases", draw(before, after), "Φₙ before (left) and after rescaling to one inner radius (right)."
         ),
@@ -77,11 +77,11 @@ def make(data: Data) -> Finding:
     return Finding(source, claims, pictures, numbers)
 
 
-def draw_stars(stars: list[spem.Shape]) -> Figure:
-    """Draw the outlines of the stars in a row."""
+def draw_stars() -> Figure:
+    """Draw the outlines of the stars in a row, on a finer grid."""
     figure = new_figure(9.4, 0.95)
-    for ax, star, n in zip(figure.subplots(1, len(stars)), stars, POINTS, strict=True):
-        draw_outline(star, ax)
+    for ax, n in zip(figure.subplots(1, len(POINTS)), POINTS, strict=True):
+        draw_outline(spem.synthetic.star_polygon(n, 4, radius=RADIUS, spacing=0.3), ax)
         bare(ax, f"{{{n}/4}}")
     return figure
 

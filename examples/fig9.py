@@ -42,13 +42,17 @@ def make(data: Data) -> Finding:
         fixed.append(signal_to_noise(original.values, values_at(several[-1], places)))
         free.append(signal_to_noise(original.values, values_at(adapted, places)))
     psnr, scaled_rho = np.array(fixed), np.array(free)
-    rows = [several[int(np.abs(scales - s).argmin())] for s in (1, 2, 4)]
-    grid = figure_map_grid(rows, ["scale 1", "scale 2", "scale 4"])
+    shown = {f"scale {s}": several[int(np.abs(scales - s).argmin())] for s in (1, 2, 4)}
+    grid = figure_map_grid(list(shown.values()), list(shown))
     return Finding(
         found.source,
         claims(scales[1:], psnr, scaled_rho),
         (
-            Picture("scales", draw(several, scales, psnr, scaled_rho), "Φₙ by scale, and PSNR of the maps."),
+            Picture(
+                "scales",
+                draw(several, scales, psnr, scaled_rho),
+                "Φₙ by scale, and PSNR of the maps; dashed lines peak where the grids coincide.",
+            ),
             Picture("maps", grid, "The same hand at scales 1, 2 and 4, drawn in one size; ρ is the same."),
         ),
         {"scale": scales[1:], "psnr_db": psnr, "psnr_db_rho_scaled": scaled_rho},

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.embedding.maps import Maps
+from spem.paper.findings import Claim, judged
+from spem.plots.figures import map_name
 from spem.shapes.distance import signed_distance
 from spem.shapes.shape import Shape
 
@@ -116,3 +118,37 @@ def pairs(values: NDArray[np.float64]) -> NDArray[np.float64]:
     [1.0, 2.0, 5.0]
     """
     return np.asarray(values[np.triu_indices(len(values), 1)])
+
+
+def judge_poses(statement: str, distances: NDArray[np.float64], n_poses: int, others: str) -> Claim:
+    """Judge whether every map is nearer between poses of one kind than between that kind and others.
+
+    Parameters
+    ----------
+    statement
+        What the paper claims.
+    distances
+        ``(n_shapes, n_shapes, n_maps)`` from `distribution_distances`; the poses come first.
+    n_poses
+        Number of poses.
+    others
+        What the other shapes are.
+
+    Examples
+    --------
+    >>> distances = np.array([[0, 1, 3], [1, 0, 3], [3, 3, 0]], float)[..., None]
+    >>> judge_poses("Poses are alike.", distances, 2, "hands").ours
+    'distance of distributions between poses against that to hands, in standard deviations: P₁ 1.000 (3.000)'
+    """
+    near = pairs(distances[:n_poses, :n_poses]).mean(axis=0)
+    far = distances[:n_poses, n_poses:].mean(axis=(0, 1))
+    each = [f"{map_name(j)} {a:.3f} ({b:.3f})" for j, (a, b) in enumerate(zip(near, far, strict=True))]
+    worse = [map_name(j) for j in range(len(near)) if near[j] >= far[j]]
+    return judged(
+        statement,
+        "consistent, as seen",
+        f"distance of distributions between poses against that to {others}, in standard deviations: "
+        + ", ".join(each),
+        not worse,
+        note=f"{', '.join(worse)} differs between poses as much as between kinds.",
+    )

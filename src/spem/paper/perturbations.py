@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from spem.errors import ShapeError
+
 Mask = NDArray[np.bool_]
 
 # Limbs are what opening by a disk of this share of the inner radius removes, of this share of the area.
@@ -192,3 +194,38 @@ def largest(mask: Mask) -> Mask:
     """
     label, count = ndimage.label(mask)
     return np.asarray(label == 1 + np.argmax(ndimage.sum(mask, label, np.arange(1, count + 1))))
+
+
+def instances(mask: Mask, rng: np.random.Generator) -> dict[str, Mask]:
+    """Return the five instances of a hand that Fig. 14 shows, by name, the hand itself first.
+
+    Parameters
+    ----------
+    mask
+        A silhouette with limbs, with room around it for the protrusions.
+    rng
+        Which noise, where protrusions stand.
+
+    Raises
+    ------
+    ShapeError
+        If it has no limbs.
+
+    Examples
+    --------
+    >>> y, x = np.mgrid[:60, :90]
+    >>> mask = ((y - 30) ** 2 + (x - 30) ** 2 < 400) | ((abs(y - 30) < 4) & (x > 30) & (x < 80))
+    >>> list(instances(mask, np.random.default_rng(0)))
+    ['original', 'occluded', 'shortened', 'protrusions', 'noise']
+    """
+    found = limbs(mask)
+    if not found:
+        msg = "a silhouette without limbs has none to take off or to shorten; choose one with limbs"
+        raise ShapeError(msg)
+    return {
+        "original": mask,
+        "occluded": without(mask, found[0]),
+        "shortened": shortened(mask, found[:3]),
+        "protrusions": protruded(mask, 2, rng),
+        "noise": noisy(mask, NOISE["noise"], rng),
+    }
