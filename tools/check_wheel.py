@@ -22,7 +22,9 @@ def main() -> None:
         python = here / "venv" / "bin" / "python"
         _run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
         _run(python, "-I", "-c", PROGRAM, cwd=here)
-        _run(here / "venv" / "bin" / "spem", "--help", cwd=here)
+        program = here / "venv" / "bin" / "spem"
+        _run(program, "--help", cwd=here)
+        _run(program, "paper", "fig1", "--quick", "-o", here / "paper", cwd=here)
 
 
 def _run(*command: str | Path, cwd: Path = ROOT) -> None:
