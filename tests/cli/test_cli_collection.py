@@ -49,6 +49,21 @@ def test_encode_writes_codes(spem: Spem, folder: Path, tmp_path: Path) -> None:
     assert not target.with_name("codes.spem.work").exists()
 
 
+def test_encode_by_a_signature(spem: Spem, folder: Path, tmp_path: Path) -> None:
+    """The kind of features is kept with the codes; a setting of another kind is refused before any work."""
+    target = tmp_path / "waves.spem"
+    options = ("--own-grid", "--features", "wks", "--n-maps", "5", "--n-pairs", "20", "--n-centers", "4")
+    assert spem("encode", folder, "-o", target, *options).exit_code == 0
+    settings = Codes.load(target).model.settings
+    assert (settings.features, settings.n_pairs, settings.n_maps) == ("wks", 20, 5)
+    answers = json.loads(spem("search", target, folder / "long1.npy", "-k", "3", "--json").stdout)
+    assert {answer["name"][:4] for answer in answers} == {"long"}
+    result = spem("encode", folder, "-o", tmp_path / "c.spem", "--features", "si-hks", "--n-rho", "9")
+    assert result.exit_code == 2
+    assert "n_rho: a setting of features 'spem', not of 'si-hks'; leave it" in result.stderr
+    assert not (tmp_path / "c.spem").exists()
+
+
 def test_encode_tells_failures_and_saves_the_rest(spem: Spem, folder: Path, tmp_path: Path) -> None:
     """One line a failed file, exit status 1, codes of the others."""
     (folder / "broken.npy").write_bytes(b"")
@@ -126,7 +141,7 @@ def test_work_survives_codes_that_cannot_be_saved(
     assert result.exit_code == 2
     assert "No space left" in result.stderr
     assert len(list(work.rglob("*.work"))) == 9
-    monkeypatch.setattr(collection, "sweep_bands", lambda *_, **__: pytest.fail("computed again"))
+    monkeypatch.setattr(collection, "shape_features", lambda *_, **__: pytest.fail("computed again"))
     again = spem("encode", folder, "-o", target, *QUICK, "--overwrite")
     assert again.exit_code == 0, again.stderr
     assert not work.exists()

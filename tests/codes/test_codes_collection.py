@@ -83,7 +83,7 @@ def test_failures_are_collected_and_the_rest_is_coded(folder: Path) -> None:
 
 def test_unexpected_exception_is_one_failure(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An error that nobody foresaw costs one shape, and the reason names its type."""
-    true, number = collection.sweep_bands, itertools.count()
+    true, number = collection.shape_features, itertools.count()
 
     def fragile(shape: Shape, settings: Settings, threads: int | None) -> object:
         if next(number) == 2:
@@ -91,7 +91,7 @@ def test_unexpected_exception_is_one_failure(folder: Path, monkeypatch: pytest.M
             raise ZeroDivisionError(message)
         return true(shape, settings, threads)
 
-    monkeypatch.setattr(collection, "sweep_bands", fragile)
+    monkeypatch.setattr(collection, "shape_features", fragile)
     codes = encode_collection(find_files([folder]), SETTINGS)
     assert len(codes) == 5
     assert codes.failures[0].reason == "unexpected ZeroDivisionError: two lines; please report it"
@@ -128,7 +128,7 @@ def test_interrupted_call_goes_on(folder: Path, tmp_path: Path, monkeypatch: pyt
     """What was done before an interruption is not done again, and the outcome is that of one run."""
     files, work = find_files([folder]), tmp_path / "codes.work"
     whole = encode_collection(files, SETTINGS)
-    true, calls = collection.sweep_bands, []
+    true, calls = collection.shape_features, []
 
     def counted(shape: Shape, settings: Settings, threads: int | None) -> object:
         calls.append(shape.name)
@@ -137,7 +137,7 @@ def test_interrupted_call_goes_on(folder: Path, tmp_path: Path, monkeypatch: pyt
             raise KeyboardInterrupt(message)
         return true(shape, settings, threads)
 
-    monkeypatch.setattr(collection, "sweep_bands", counted)
+    monkeypatch.setattr(collection, "shape_features", counted)
     with pytest.raises(KeyboardInterrupt, match="stopped"):
         encode_collection(files, SETTINGS, work=work)
     assert work.is_dir()
@@ -191,8 +191,8 @@ def test_known_codes_are_taken_over(folder: Path, monkeypatch: pytest.MonkeyPatc
     files = find_files([folder])
     known = encode_collection(files[:4], SETTINGS)
     calls = []
-    true = collection.sweep_bands
-    monkeypatch.setattr(collection, "sweep_bands", lambda *a: (calls.append(1), true(*a))[1])
+    true = collection.shape_features
+    monkeypatch.setattr(collection, "shape_features", lambda *a: (calls.append(1), true(*a))[1])
     codes = encode_collection(files, known=known)
     assert len(calls) == 2
     np.testing.assert_array_equal(codes.vectors[:4], known.vectors)
@@ -204,8 +204,8 @@ def test_equal_files_are_computed_once(folder: Path, monkeypatch: pytest.MonkeyP
     """A copy of a file gets the code of the first without being computed."""
     (folder / "copy.npy").write_bytes((folder / "e0.npy").read_bytes())
     calls = []
-    true = collection.sweep_bands
-    monkeypatch.setattr(collection, "sweep_bands", lambda *a: (calls.append(1), true(*a))[1])
+    true = collection.shape_features
+    monkeypatch.setattr(collection, "shape_features", lambda *a: (calls.append(1), true(*a))[1])
     codes = encode_collection(find_files([folder]), SETTINGS)
     assert (len(codes), len(calls)) == (7, 6)
     np.testing.assert_array_equal(codes.vectors[0], codes.vectors[codes.names.index("e0")])

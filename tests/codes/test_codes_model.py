@@ -44,6 +44,16 @@ def test_saved_model_is_the_same_model(model, tmp_path):
         np.testing.assert_array_equal(loaded.encode(bands), model.encode(bands))
 
 
+def test_model_from_before_kinds_of_features_is_one_of_maps(model, tmp_path):
+    """A file without the newer settings gives the model that it gave, and the same codes."""
+    header = model.to_header()
+    header["settings"] = {k: v for k, v in header["settings"].items() if k not in ("features", "n_pairs")}
+    write_container(tmp_path / "old.spem", "model", header, model.to_arrays())
+    loaded = Model.load(tmp_path / "old.spem")
+    assert loaded.settings == model.settings
+    np.testing.assert_array_equal(loaded.encode(shapes(2)[0]), model.encode(shapes(2)[0]))
+
+
 def test_digest_tells_settings_and_vocabularies_apart(model):
     """Another setting or another collection gives another digest, the same ones the same."""
     assert Model.fit(SETTINGS, shapes()).digest == model.digest

@@ -46,6 +46,15 @@ def test_settings_survive_json():
         ({"moments": 0}, "moments=0 must be a whole number from 1 to 2"),
         ({"scheme": "cubic"}, "must be one of linear, squared, log"),
         ({"power": -0.1}, "must lie in"),
+        ({"features": "sihks"}, "features='sihks' must be one of spem, hks, si-hks, wks"),
+        ({"n_pairs": 0}, "n_pairs=0 must be a whole number of at least 1"),
+        (
+            {"n_pairs": 50},
+            "n_pairs: a setting of features 'hks' or 'si-hks' or 'wks', not of 'spem'; leave it",
+        ),
+        ({"features": "wks", "n_rho": 32}, "n_rho: a setting of features 'spem', not of 'wks'; leave it out"),
+        ({"features": "hks", "rho_ranges": ((0.1, 0.2),)}, "rho_ranges: a setting of features 'spem'"),
+        ({"features": "hks", "centred": True}, "centred: a setting of features 'spem'"),
         ({"code_format": 9}, "code_format=9: this spem makes format"),
     ],
 )
@@ -65,6 +74,26 @@ def test_option_that_is_no_setting_is_named():
     """Of several options only the unknown one is blamed."""
     with pytest.raises(ParameterError, match=r"^nope: no setting of a code; expected any of voxels, "):
         Settings.of({"voxels": 900, "nope": 1})
+
+
+def test_settings_of_a_signature():
+    """More values than ρ are fine, all of one band; the settings of the paper have no other kind."""
+    made = Settings(features="wks", n_maps=80, n_pairs=200)
+    assert (made.n_bands, Settings(rho_ranges=((0.1, 0.2), (0.2, 0.4))).n_bands) == (1, 2)
+    assert Settings.from_json(made.to_json()) == made
+    with pytest.raises(ParameterError, match=r"features='wks': the settings of 5.5 are of SPEM maps"):
+        Settings.paper(features="wks")
+
+
+def test_settings_of_files_from_before_a_setting_stand_at_its_default():
+    """Files that know nothing of kinds hold SPEM maps; one that lacks an older setting is refused."""
+    values = Settings(n_maps=4).to_json()
+    for name in ("features", "n_pairs"):
+        del values[name]
+    assert Settings.from_json(values) == Settings(n_maps=4)
+    del values["n_maps"]
+    with pytest.raises(ModelError, match="differs in: n_maps; make it again"):
+        Settings.from_json(values)
 
 
 @pytest.mark.parametrize(

@@ -129,5 +129,5 @@ def test_impossible_options_are_refused(dog):
         heat_kernel_signature(dog, n_times=0)
     with pytest.raises(ParameterError, match="n_frequencies=1000 must be a whole number from 1 to"):
         scale_invariant_signature(dog, 1000)
-    with pytest.raises(ParameterError, match="2 pairs have no two values above zero; solve for more"):
+    with pytest.raises(ParameterError, match="no two values above zero among 2; solve for more pairs"):
         heat_kernel_signature(dog.truncated(2))

@@ -14,6 +14,7 @@ from spem.cli.options import (
     BoundaryChoice,
     ComponentsChoice,
     Device,
+    FeaturesChoice,
     Jobs,
     Json,
     SchemeChoice,
@@ -51,6 +52,10 @@ def encode(
     own_grid: Annotated[
         bool, typer.Option("--own-grid", help="Keep the grid of images and volumes, whatever their size.")
     ] = False,
+    features: Annotated[
+        FeaturesChoice | None,
+        typer.Option(help="What is known of each node: SPEM maps, or a signature of its spectrum. [spem]"),
+    ] = None,
     boundary: Annotated[BoundaryChoice | None, typer.Option(help="Where v = 1. [surface]")] = None,
     rho_range: Annotated[
         list[str] | None,
@@ -58,7 +63,12 @@ def encode(
     ] = None,
     n_rho: Annotated[int | None, typer.Option(min=1, help="Number of ρ in each range. [64]")] = None,
     rho_scheme: Annotated[SchemeChoice | None, typer.Option(help="How ρ is spread. [linear]")] = None,
-    n_maps: Annotated[int | None, typer.Option(min=1, help="Maps of each range. [8]")] = None,
+    n_pairs: Annotated[
+        int | None, typer.Option(min=1, help="Eigenpairs that a signature is made of. [100]")
+    ] = None,
+    n_maps: Annotated[
+        int | None, typer.Option(min=1, help="Maps of each range; values of a signature. [8]")
+    ] = None,
     n_centers: Annotated[int | None, typer.Option(min=1, help="Centres of the vocabulary. [64]")] = None,
     power: Annotated[
         float | None, typer.Option(help="Exponent of the residuals, α of (5.3), 0 to 1. [0.5]")
@@ -99,6 +109,7 @@ def encode(
       spem encode shapes/ -o shapes.spem
       spem encode 'scans/**/*.off' -o scans.spem --voxels 60000 --jobs 4
       spem encode new/ -o new.spem --vocabulary shapes.spem
+      spem encode shapes/ -o waves.spem --features wks
       spem encode more/ -o shapes.spem                      adds to shapes.spem
     """  # noqa: D301
     from spem.codes.settings import Settings
@@ -109,10 +120,12 @@ def encode(
         raise ParameterError(msg)
     given = _given(
         voxels=voxels,
+        features=features,
         boundary=boundary,
         rho_ranges=_ranges(rho_range),
         n_rho=n_rho,
         scheme=rho_scheme,
+        n_pairs=n_pairs,
         n_maps=n_maps,
         n_centers=n_centers,
         power=power,

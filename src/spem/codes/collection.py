@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from spem.codes.codes import Codes, Failure
-from spem.codes.features import node_features, sweep_bands
+from spem.codes.kinds import shape_features
 from spem.codes.listing import Listing
 from spem.codes.model import Model
 from spem.codes.settings import Settings
@@ -235,7 +235,7 @@ def _entries(
         try:
             if model is not None:
                 model.require_ndim(shape.ndim, source_path(source) + suffix)
-            bands = node_features(sweep_bands(shape, settings, threads), settings)
+            bands = shape_features(shape, settings, threads)
         except SpemError as error:
             if not suffix:
                 raise

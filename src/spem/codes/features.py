@@ -1,4 +1,4 @@
-"""Node features: the maps of each band of ρ, all from one sweep of the shape."""
+"""Node features of kind "spem": the maps of each band of ρ, all from one sweep of the shape."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def node_features(field: Hyperfield, settings: Settings) -> Bands:
     >>> [block.shape[1] for block in node_features(field, settings)]
     [4]
     """
-    keep = _kept(field.shape, drop_boundary=settings.drop_boundary)
+    keep = kept_nodes(field.shape, drop_boundary=settings.drop_boundary)
     bands = range(len(settings.rho_ranges))
     values = (band_maps(field, settings, band).values for band in bands)
     return tuple(np.ascontiguousarray(block[keep], np.float32) for block in values)
@@ -104,8 +104,20 @@ def band_maps(field: Hyperfield, settings: Settings, band: int = 0) -> Maps:
     return compute_maps(replace(field, rho=rho), settings.n_maps, centred=settings.centred)
 
 
-def _kept(shape: Shape, *, drop_boundary: bool) -> Any:
-    """Select all nodes, or those without a boundary edge."""
+def kept_nodes(shape: Shape, *, drop_boundary: bool) -> Any:
+    """Select all nodes, or those without a boundary edge; an index into arrays of nodes.
+
+    Raises
+    ------
+    ShapeError
+        When no node is left.
+
+    Examples
+    --------
+    >>> square = Shape.from_mask(np.ones((3, 3)))
+    >>> int(kept_nodes(square, drop_boundary=True).sum())
+    1
+    """
     if not drop_boundary:
         return slice(None)
     inner = (surface_domain(shape).neighbours < shape.n_nodes).all(axis=1)

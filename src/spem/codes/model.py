@@ -49,7 +49,7 @@ class Model:
     def __post_init__(self) -> None:
         s = self.settings
         shapes = [array.shape for array in self.to_arrays().values()]
-        n_bands, d = len(s.rho_ranges), s.n_maps
+        n_bands, d = s.n_bands, s.n_maps
         expected = [(d,), (d, d), (s.n_centers, d)] * n_bands + [(s.n_centers, d)] * n_bands * (s.moments - 1)
         if shapes != expected:
             msg = f"a model of {n_bands} bands, {s.n_centers} centres and {s.n_maps} maps got arrays {shapes}"
@@ -170,7 +170,7 @@ class Model:
             msg = f"{source}: the settings are no table of names and values; make it again"
             raise ModelError(msg)
         checked = Settings.from_json(values, source)
-        bands = range(len(checked.rho_ranges))
+        bands = range(checked.n_bands)
         try:
             normalisations = tuple(
                 Normalisation(arrays[f"{prefix}mean.{band}"], arrays[f"{prefix}transform.{band}"])

@@ -20,9 +20,26 @@ from spem.shapes.limits import DEFAULT_VOXELS
 CODE_FORMAT = 1
 
 Components = Literal["largest", "all"]
-_CHOICES = {"boundary": Boundary, "scheme": Scheme, "components": Components, "scaling": Scaling}
+Features = Literal["spem", "hks", "si-hks", "wks"]
+# Settings that belong to some kinds of features alone.
+_OF_SPECTRA = ("n_pairs",)
+OWN_SETTINGS: dict[str, tuple[str, ...]] = {
+    "spem": ("rho_ranges", "scheme", "n_rho", "centred"),
+    "hks": _OF_SPECTRA,
+    "si-hks": _OF_SPECTRA,
+    "wks": _OF_SPECTRA,
+}
+# Settings that came later, with what was done before as their default: earlier files lack them.
+_ADDED = ("features", "n_pairs")
+_CHOICES = {
+    "features": Features,
+    "boundary": Boundary,
+    "scheme": Scheme,
+    "components": Components,
+    "scaling": Scaling,
+}
 _CHECKS: dict[str, Callable[[str, Any], Any]] = {
-    **dict.fromkeys(("voxels", "n_rho", "n_maps", "n_centers", "nodes_per_shape"), whole_number),
+    **dict.fromkeys(("voxels", "n_rho", "n_pairs", "n_maps", "n_centers", "nodes_per_shape"), whole_number),
     "moments": partial(whole_number, largest=2),
     # k-means takes seeds of 32 bits.
     "seed": partial(whole_number, least=0, largest=2**32 - 1),
@@ -47,6 +64,9 @@ class Settings:
         Whether shapes are darker than the background, of images; found for each where None.
     components
         Whether the largest component of a shape is kept or all.
+    features
+        What is known of each node: ``"spem"``, its SPEM maps; or a signature from the spectrum of the shape,
+        ``"hks"`` of the heat kernel, ``"si-hks"`` of it but invariant to scale, ``"wks"`` of the wave kernel.
     boundary
         Where the boundary lies: ``"surface"`` at the cuts, ``"voxel"`` as in the paper.
     rho_ranges
@@ -55,8 +75,10 @@ class Settings:
         How ρ is spread over its range: linear in ρ, in ρ² or logarithmic.
     n_rho
         Number of ρ in each range.
+    n_pairs
+        Number of eigenpairs that signatures are made of.
     n_maps
-        Number of projections taken from each band.
+        Number of projections taken from each band; of times, frequencies or energies of a signature.
     centred
         Whether the mean field is subtracted before the PCA.
     drop_boundary
@@ -88,10 +110,12 @@ class Settings:
     threshold: float | None = None
     dark: bool | None = None
     components: Components = "largest"
+    features: Features = "spem"
     boundary: Boundary = "surface"
     rho_ranges: tuple[tuple[float, float], ...] = (DEFAULT_RANGE,)
     scheme: Scheme = "linear"
     n_rho: int = DEFAULT_COUNT
+    n_pairs: int = 100
     n_maps: int = 8
     centred: bool = False
     drop_boundary: bool = False
@@ -120,9 +144,25 @@ class Settings:
         if not 0 <= self.power <= 1:
             msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"
             raise ParameterError(msg)
-        if self.n_maps > self.n_rho:
+        self._check_kind()
+        if self.features == "spem" and self.n_maps > self.n_rho:
             msg = f"n_maps={self.n_maps} must be at most n_rho={self.n_rho}, the number of ρ in each range"
             raise ParameterError(msg)
+
+    def _check_kind(self) -> None:
+        """Refuse settings that have no meaning for this kind of features."""
+        own = OWN_SETTINGS[self.features]
+        for entry in fields(self):
+            kinds = [kind for kind, names in OWN_SETTINGS.items() if entry.name in names]
+            if kinds and entry.name not in own and getattr(self, entry.name) != entry.default:
+                of = " or ".join(map(repr, kinds))
+                msg = f"{entry.name}: a setting of features {of}, not of {self.features!r}; leave it out"
+                raise ParameterError(msg)
+
+    @property
+    def n_bands(self) -> int:
+        """Number of arrays of features that a shape has: one a range of ρ, one of a signature."""
+        return len(self.rho_ranges) if "rho_ranges" in OWN_SETTINGS[self.features] else 1
 
     @classmethod
     def of(cls, options: Mapping[str, Any]) -> Self:
@@ -156,6 +196,9 @@ class Settings:
         >>> Settings.paper(voxels=15_000).n_centers
         32
         """
+        if changes.get("features", "spem") != "spem":
+            msg = f"features={changes['features']!r}: the settings of 5.5 are of SPEM maps; leave one out"
+            raise ParameterError(msg)
         chosen: dict[str, Any] = {
             "voxels": 250_000,
             "boundary": "voxel",
@@ -187,7 +230,8 @@ class Settings:
         Raises
         ------
         ModelError
-            When they were written for another method, or name a setting that is not known here.
+            When they were written for another method, or name a setting that is not known here. Settings that
+            are newer than the file stand at their defaults.
         """
         found = values.get("code_format")
         if found != CODE_FORMAT:
@@ -196,8 +240,8 @@ class Settings:
             msg = f"{source}: codes of format {found} (spem {made}), this spem makes {CODE_FORMAT}; {advice}"
             raise ModelError(msg)
         known = {entry.name for entry in fields(cls)}
-        if set(values) != known:
-            odd = ", ".join(sorted(set(values) ^ known))
+        if not known - set(_ADDED) <= set(values) <= known:
+            odd = ", ".join(sorted((set(values) ^ known) - set(_ADDED)))
             msg = f"{source}: settings do not fit this spem, which differs in: {odd}; make it again"
             raise ModelError(msg)
         try:

@@ -216,7 +216,9 @@ def _span(spectrum: Spectrum) -> tuple[float, float]:
     """Return the first value above zero and the last."""
     values = spectrum.values[_above_zero(spectrum)]
     if values.size < 2 or not values[-1] > values[0]:
-        msg = f"{spectrum.shape.name}: {spectrum.n_pairs} pairs have no two values above zero; solve for more"
+        msg = (
+            f"{spectrum.shape.name}: no two values above zero among {spectrum.n_pairs}; solve for more pairs"
+        )
         raise ParameterError(msg)
     return float(values[0]), float(values[-1])
 
