@@ -10,10 +10,11 @@ if TYPE_CHECKING:
     from spem.api.parts import parts, source_fields, sources
     from spem.codes.codes import Codes, Failure
     from spem.codes.model import Model
+    from spem.codes.moments import NodalMoments, hu_moments
     from spem.codes.settings import Settings
     from spem.codes.vlad import VLAD
     from spem.codes.vocabulary import Vocabulary
-    from spem.collections import encode, evaluate, search
+    from spem.collections import classify, encode, evaluate, search
     from spem.decomposition.choice import ErrorCurve, error_curve
     from spem.decomposition.clusters import Clusters, cluster_interactions
     from spem.decomposition.interactions import node_correlation, source_correlation, source_node_correlation
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from spem.decomposition.transfer import vertex_labels
     from spem.embedding.heat import diffusion_distance, heat_kernel
     from spem.embedding.maps import Maps
+    from spem.embedding.nodal import nodal_domains, nodal_thresholds
     from spem.embedding.signatures import (
         heat_kernel_signature,
         scale_invariant_signature,
@@ -48,6 +50,7 @@ if TYPE_CHECKING:
     from spem.fields.gradients import source_gradient
     from spem.fields.hyperfield import Hyperfield
     from spem.fields.isocontours import iso_contours, iso_surfaces
+    from spem.fields.level_curves import level_curvature, turning_angles
     from spem.fields.solvers.cg import ConjugateGradient
     from spem.fields.solvers.direct import Direct
     from spem.fields.solvers.explicit import ExplicitIteration
@@ -58,6 +61,7 @@ if TYPE_CHECKING:
     from spem.fields.streamlines import Streamlines, source_streamlines
     from spem.fields.superposition.fields import SourceFields
     from spem.fields.superposition.hyperfield import SourceHyperfield
+    from spem.retrieval.classification import Classification
     from spem.retrieval.distances import correlation_distance, fuse
     from spem.retrieval.evaluation import PrecisionRecall, Scores, bulls_eye, precision_recall
     from spem.retrieval.ranking import Answer
@@ -71,6 +75,7 @@ __version__ = "0.1.0"
 __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three lists
     "Answer",
     "BlockLanczos",
+    "Classification",
     "Clusters",
     "Codes",
     "ConjugateGradient",
@@ -86,6 +91,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "MatchedParts",
     "Model",
     "ModelError",
+    "NodalMoments",
     "NonnegativeSparseCoding",
     "ParameterError",
     "Parts",
@@ -108,6 +114,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "VLAD",
     "Vocabulary",
     "bulls_eye",
+    "classify",
     "cluster_interactions",
     "correlation_distance",
     "creatures",
@@ -120,12 +127,16 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "fuse",
     "heat_kernel",
     "heat_kernel_signature",
+    "hu_moments",
     "inner_distances",
     "iso_contours",
     "iso_surfaces",
     "joint_parts",
+    "level_curvature",
     "maps",
     "match_parts",
+    "nodal_domains",
+    "nodal_thresholds",
     "node_correlation",
     "parts",
     "precision_recall",
@@ -147,6 +158,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "sources",
     "sweep",
     "synthetic",
+    "turning_angles",
     "vertex_labels",
     "wave_kernel_signature",
 ]
@@ -155,6 +167,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
 _HOME = {
     "Answer": "spem.retrieval.ranking",
     "BlockLanczos": "spem.fields.solvers.lanczos",
+    "Classification": "spem.retrieval.classification",
     "Clusters": "spem.decomposition.clusters",
     "Codes": "spem.codes.codes",
     "ConjugateGradient": "spem.fields.solvers.cg",
@@ -170,6 +183,7 @@ _HOME = {
     "MatchedParts": "spem.decomposition.matched",
     "Model": "spem.codes.model",
     "ModelError": "spem.errors",
+    "NodalMoments": "spem.codes.moments",
     "NonnegativeSparseCoding": "spem.decomposition.sparse_coding",
     "ParameterError": "spem.errors",
     "Parts": "spem.decomposition.parts",
@@ -192,6 +206,7 @@ _HOME = {
     "VLAD": "spem.codes.vlad",
     "Vocabulary": "spem.codes.vocabulary",
     "bulls_eye": "spem.retrieval.evaluation",
+    "classify": "spem.collections",
     "cluster_interactions": "spem.decomposition.clusters",
     "correlation_distance": "spem.retrieval.distances",
     "creatures": "spem.shapes.creatures",
@@ -204,12 +219,16 @@ _HOME = {
     "fuse": "spem.retrieval.distances",
     "heat_kernel": "spem.embedding.heat",
     "heat_kernel_signature": "spem.embedding.signatures",
+    "hu_moments": "spem.codes.moments",
     "inner_distances": "spem.fields.geodesics",
     "iso_contours": "spem.fields.isocontours",
     "iso_surfaces": "spem.fields.isocontours",
     "joint_parts": "spem.decomposition.joint",
+    "level_curvature": "spem.fields.level_curves",
     "maps": "spem.api.fields",
     "match_parts": "spem.decomposition.matching",
+    "nodal_domains": "spem.embedding.nodal",
+    "nodal_thresholds": "spem.embedding.nodal",
     "node_correlation": "spem.decomposition.interactions",
     "parts": "spem.api.parts",
     "precision_recall": "spem.retrieval.evaluation",
@@ -231,6 +250,7 @@ _HOME = {
     "sources": "spem.api.parts",
     "sweep": "spem.api.fields",
     "synthetic": "spem.shapes.synthetic",
+    "turning_angles": "spem.fields.level_curves",
     "vertex_labels": "spem.decomposition.transfer",
     "wave_kernel_signature": "spem.embedding.signatures",
 }
