@@ -19,7 +19,7 @@ from spem.shapes.creatures import (
     creature_mesh,
     write_collection,
 )
-from spem.shapes.skeletons import random_pose
+from spem.shapes.poses import random_pose
 
 KINDS = creature_kinds()
 

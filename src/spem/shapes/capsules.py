@@ -64,6 +64,20 @@ class Capsules:
         np.maximum.at(depth, point, self._depth(near[capsule], columns[:, point]))
         return depth
 
+    def deepest(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the capsule ``(m,)`` that each of the points ``(m, d)`` is deepest in, the first of equals.
+
+        Examples
+        --------
+        >>> apart = Capsules(np.array([[0.0], [9.0]]), np.array([[1.0], [9.5]]), np.ones((2, 2)))
+        >>> apart.deepest(np.array([[8.2], [0.5]])).tolist()
+        [1, 0]
+        """
+        columns = np.ascontiguousarray(points.T)
+        number = np.arange(len(points))
+        depth = [self._depth(np.full_like(number, capsule), columns) for capsule in range(len(self.start))]
+        return np.asarray(np.argmax(depth, axis=0))
+
     def spheres(self, per_capsule: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return centres ``(n * k, d)`` and radii ``(n * k,)`` of balls along the capsules."""
         t = np.linspace(0, 1, per_capsule)

@@ -15,8 +15,9 @@ from skimage.measure import marching_cubes
 from spem.errors import ParameterError
 from spem.shapes.capsules import Capsules
 from spem.shapes.implicit import implicit_shape, sample_level
+from spem.shapes.poses import random_pose
 from spem.shapes.shape import Shape
-from spem.shapes.skeletons import random_pose, skeleton_kinds
+from spem.shapes.skeletons import skeleton_kinds
 
 # Nodes of a creature where nothing is asked for.
 VOXELS = {2: 6000, 3: 15000}
@@ -77,19 +78,43 @@ def creature(
     >>> creature("dog", spacing=0.02, rng=np.random.default_rng(0)).ndim
     2
     """
+    return body_shape(random_pose(kind, ndim, rng), voxels, spacing, name=name or kind)
+
+
+def body_shape(
+    body: Capsules, voxels: int | None = None, spacing: float | None = None, *, name: str = "creature"
+) -> Shape:
+    """Return the shape of a body: of about so many nodes, or of a given spacing.
+
+    Parameters
+    ----------
+    body
+        Capsules in 2 or 3 dimensions.
+    voxels, spacing, name
+        As for `creature`.
+
+    Raises
+    ------
+    ParameterError
+        If both sizes are given, or there is to be no node.
+
+    Examples
+    --------
+    >>> body_shape(random_pose("ant", 2, np.random.default_rng(0)), spacing=0.02).ndim
+    2
+    """
     if voxels is not None and spacing is not None:
         msg = f"voxels = {voxels} and spacing = {spacing} are both given; give one"
         raise ParameterError(msg)
-    body = random_pose(kind, ndim, rng)
+    low, high = body.bounds()
     if spacing is None:
-        budget = VOXELS[ndim] if voxels is None else voxels
+        budget = VOXELS[low.size] if voxels is None else voxels
         if budget < 1:
             msg = f"voxels must be at least 1, not {budget}"
             raise ParameterError(msg)
-        spacing = (_volume(body) / budget) ** (1 / ndim)
-    low, high = body.bounds()
+        spacing = (_volume(body) / budget) ** (1 / low.size)
     step = spacing
-    return implicit_shape(lambda x: body.level(x, 2 * step), low, high, step, name=name or kind)
+    return implicit_shape(lambda x: body.level(x, 2 * step), low, high, step, name=name)
 
 
 def creature_mesh(

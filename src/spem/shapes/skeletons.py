@@ -1,4 +1,4 @@
-"""Skeletons of articulated creatures, and their random poses."""
+"""Skeletons of articulated creatures."""
 
 from __future__ import annotations
 
@@ -12,16 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError
-from spem.shapes.capsules import Capsules
-
-# Standard deviation, in logarithms, of lengths and radii within a class.
-LENGTH_JITTER = 0.05
-RADIUS_JITTER = 0.035
-# Balls along each bone by which overlap is measured, poses tried, and the gap asked for between
-# parts that do not touch at rest.
-BALLS = 4
-TRIES = 8
-CLEARANCE = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,66 +87,40 @@ def skeleton(kind: str) -> Skeleton:
     >>> len(skeleton("starfish").length)
     21
     """
-    if kind not in _table():
-        msg = f"kind must be one of {', '.join(_table())}, not {kind!r}"
-        raise ParameterError(msg)
-    entry = _table()[kind]
+    _check(kind)
+    entry, axis = _table()[kind], mirror_axis(kind)
     bones: list[dict[str, Any]] = []
     last: dict[str, list[int]] = {}
     for part, row in enumerate(entry["bones"]):
         for mirrored in (False, True)[: 1 + row[0].endswith("_l")]:
-            _append(bones, last, row, part, "xyz".index(entry["mirror"]) if mirrored else None)
+            _append(bones, last, row, part, axis if mirrored else None)
     return Skeleton(**{name: np.array([bone[name] for bone in bones]) for name in bones[0]})
 
 
-def random_pose(kind: str, ndim: int, rng: np.random.Generator) -> Capsules:
-    """Return a kind's body in a random pose, of a random build.
-
-    Of several poses the one is taken whose parts overlap least, beyond their overlap at rest.
-
-    Parameters
-    ----------
-    kind
-        One of `skeleton_kinds`.
-    ndim
-        2 for the silhouette, in (row, column), or 3 for the body, in (x, y, z).
-    rng
-        Source of chance.
-
-    Returns
-    -------
-    Capsules
-        One a bone, of dimension `ndim`.
+def mirror_axis(kind: str) -> int | None:
+    """Return the axis, 0 to 2, along which left and right of a kind are mirror images at rest; None without.
 
     Raises
     ------
     ParameterError
-        If there is no such kind, or `ndim` is neither 2 nor 3.
+        If there is no such kind.
 
     Examples
     --------
-    >>> random_pose("ant", 2, np.random.default_rng(0)).start.shape
-    (23, 2)
+    >>> mirror_axis("human"), mirror_axis("dog"), mirror_axis("hand")
+    (0, 2, None)
     """
-    if ndim not in (2, 3):
-        msg = f"creatures live in 2 or 3 dimensions, not {ndim}"
+    _check(kind)
+    entry = _table()[kind]
+    paired = any(row[0].endswith("_l") for row in entry["bones"])
+    return "xyz".index(entry["mirror"]) if paired else None
+
+
+def _check(kind: str) -> None:
+    """Refuse kinds that there are not."""
+    if kind not in _table():
+        msg = f"kind must be one of {', '.join(_table())}, not {kind!r}"
         raise ParameterError(msg)
-    bones = skeleton(kind)
-    n_parts = bones.part.max() + 1
-    length = bones.length * np.exp(LENGTH_JITTER * _bounded_normal(rng, n_parts))[bones.part]
-    radius = bones.radius * np.exp(RADIUS_JITTER * _bounded_normal(rng, n_parts))[bones.part, None]
-    middle = bones.bend.mean(axis=1)
-    best, least = _placed(bones, length, radius, middle, 0 * middle, ndim), np.inf
-    rest = _overlap(best)
-    for _ in range(TRIES):
-        turn, tilt = _random_angles(bones, rng)
-        pose = _placed(bones, length, radius, turn, tilt if ndim == 3 else 0 * tilt, ndim)
-        excess = float(np.maximum(_overlap(pose) - rest, 0).sum())
-        if excess < least:
-            best, least = pose, excess
-        if excess == 0:
-            break
-    return best
 
 
 @cache
@@ -202,66 +166,3 @@ def _append(
             }
         )
         last[name].append(len(bones) - 1)
-
-
-def _bounded_normal(rng: np.random.Generator, n: int) -> NDArray[np.float64]:
-    """Return normal deviates of at most two deviations."""
-    return np.clip(rng.normal(size=n), -2, 2)
-
-
-def _random_angles(
-    bones: Skeleton, rng: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return angles about z and out of the plane: uniform for single bones, waves along limbs."""
-    n = bones.limb.max() + 1
-    phase, waves = rng.uniform(0, 2 * np.pi, (2, n)), rng.uniform(0.3, 1.0, (2, n))
-    single = rng.uniform(-1, 1, (2, bones.limb.size))
-    wave = np.sin(phase[:, bones.limb] + 2 * np.pi * waves[:, bones.limb] * np.nan_to_num(bones.place))
-    unit = np.where(np.isnan(bones.place), single, wave)
-    half = np.diff(bones.bend, axis=1)[:, 0] / 2
-    return bones.bend.mean(axis=1) + half * unit[0], bones.sway * unit[1]
-
-
-def _placed(
-    bones: Skeleton,
-    length: NDArray[np.float64],
-    radius: NDArray[np.float64],
-    turn: NDArray[np.float64],
-    tilt: NDArray[np.float64],
-    ndim: int,
-) -> Capsules:
-    """Place the bones by their joint angles."""
-    up = np.array([0.0, 0.0, 1.0])
-    side = np.cross(up, bones.heading)
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    local = _rotations(np.broadcast_to(up, side.shape), turn) @ _rotations(side, tilt)
-    n = length.size
-    frame, start, end = np.empty((n, 3, 3)), np.zeros((n, 3)), np.empty((n, 3))
-    for i, p in enumerate(bones.parent.tolist()):
-        if p < 0:
-            frame[i], start[i] = local[i], local[i] @ bones.offset[i]
-        else:
-            frame[i] = frame[p] @ local[i]
-            start[i] = start[p] + bones.along[i] * (end[p] - start[p]) + frame[p] @ bones.offset[i]
-        end[i] = start[i] + length[i] * (frame[i] @ bones.heading[i])
-    if ndim == 2:
-        # The silhouette of a ball is a disk, so that of a capsule is one as well.
-        start, end = (np.stack([-x[:, 1], x[:, 0]], axis=1) for x in (start, end))
-    return Capsules(start, end, radius)
-
-
-def _rotations(axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotations ``(n, 3, 3)`` about unit axes (Rodrigues)."""
-    x, y, z = axis.T
-    zero = np.zeros_like(x)
-    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    return np.asarray(np.eye(3) + s * cross + (1 - c) * (cross @ cross))
-
-
-def _overlap(pose: Capsules) -> NDArray[np.float64]:
-    """Return how deep balls along the bones overlap each other, with some clearance; 0 for none."""
-    centre, radius = pose.spheres(BALLS)
-    square = np.einsum("nd,nd->n", centre, centre)
-    distance = np.sqrt(np.maximum(square[:, None] + square - 2 * centre @ centre.T, 0))
-    return np.asarray(np.maximum(radius[:, None] + radius + CLEARANCE - distance, 0))
