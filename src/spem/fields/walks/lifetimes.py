@@ -17,8 +17,8 @@ _DEEPEST = 600.0
 def expected_steps(walk: Walk) -> NDArray[np.float64]:
     """Return the mean number of steps until a walk from each node ends, on the boundary or killed.
 
-    That is (1/h) (A + M/ρ²)⁻¹ (D h) with D the diagonal. It grows with the square of the width of the shape in
-    voxels, up to about 1 + 2 d ρ²/h² on a grid of spacing h.
+    That is (1/h) (A + M/ρ²)⁻¹ (D h) with D the diagonal. It grows with the square of the width of the shape
+    in voxels, up to about 1 + 2 d ρ²/h² on a grid of spacing h.
 
     Parameters
     ----------
