@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from spem.retrieval.evaluation import PrecisionRecall, Scores, bulls_eye, precision_recall
     from spem.retrieval.ranking import Answer
     from spem.shapes import creatures, synthetic
+    from spem.shapes.landmarks import CreaturePoses, creature_poses
     from spem.shapes.levels import signed_distance_shape
     from spem.shapes.read import read, read_all
     from spem.shapes.shape import Cuts, Report, Shape
@@ -80,6 +81,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "Codes",
     "ConjugateGradient",
     "ConvergenceError",
+    "CreaturePoses",
     "Cuts",
     "Direct",
     "ErrorCurve",
@@ -117,6 +119,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "classify",
     "cluster_interactions",
     "correlation_distance",
+    "creature_poses",
     "creatures",
     "diffusion_distance",
     "distance_to_boundary",
@@ -172,6 +175,7 @@ _HOME = {
     "Codes": "spem.codes.codes",
     "ConjugateGradient": "spem.fields.solvers.cg",
     "ConvergenceError": "spem.errors",
+    "CreaturePoses": "spem.shapes.landmarks",
     "Cuts": "spem.shapes.shape",
     "Direct": "spem.fields.solvers.direct",
     "ErrorCurve": "spem.decomposition.choice",
@@ -209,6 +213,7 @@ _HOME = {
     "classify": "spem.collections",
     "cluster_interactions": "spem.decomposition.clusters",
     "correlation_distance": "spem.retrieval.distances",
+    "creature_poses": "spem.shapes.landmarks",
     "creatures": "spem.shapes.creatures",
     "diffusion_distance": "spem.embedding.heat",
     "distance_to_boundary": "spem.fields.boundary_distance",

@@ -6,12 +6,16 @@ from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from spem.codes.codes import Codes
 from spem.codes.collection import encode_collection, encode_file
 from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.codes.sources import as_source, find_files, source_hash
 from spem.errors import LabelError, ParameterError, ReadError
+from spem.retrieval.classification import Classification, classify_vectors
 from spem.retrieval.distances import correlation_distance
 from spem.retrieval.evaluation import Scores
 from spem.retrieval.evaluation import evaluate as evaluate_distances
@@ -144,16 +148,71 @@ def evaluate(
     >>> spem.evaluate(codes, ["disk", "disk", "disk"]).mean()["NN"]
     100.0
     """
-    collection = codes if isinstance(codes, Codes) else Codes.load(codes)
-    if isinstance(labels, (str, Path)):
-        labels = read_labels(labels)
-    if ignore_unlabelled and isinstance(labels, Mapping):
-        collection = collection.take(labelled(row_keys(collection), labels))
-    classes = match_labels(row_keys(collection), labels) if isinstance(labels, Mapping) else list(labels)
-    if len(classes) != len(collection):
-        msg = f"{len(classes)} labels for {len(collection)} shapes; give one for each row of the codes"
-        raise LabelError(msg)
+    collection, classes = _with_classes(codes, labels, ignore_unlabelled=ignore_unlabelled)
     return evaluate_distances(correlation_distance(collection.vectors, collection.vectors), classes)
+
+
+def classify(
+    codes: Codes | ArrayLike | str | Path,
+    labels: str | Path | Mapping[str, str] | Sequence[Hashable],
+    *,
+    n_train: int = 10,
+    repeats: int = 10,
+    classifier: Any = None,
+    ignore_unlabelled: bool = False,
+    rng: np.random.Generator | None = None,
+) -> Classification:
+    """Train a classifier on some shapes of each class and test it on the others, several times.
+
+    Parameters
+    ----------
+    codes
+        Codes, or the file that holds them; or ``(n_shapes, n_code)`` vectors of any kind, with one label
+        each.
+    labels, ignore_unlabelled
+        As for `evaluate`.
+    n_train
+        Number of shapes drawn from each class for training; all others are tests.
+    repeats
+        Number of splits.
+    classifier
+        A classifier of scikit-learn; by default a linear support vector machine on standardised entries.
+    rng
+        Draws the splits; seed 0 by default.
+
+    Returns
+    -------
+    Classification
+        Mean and deviation of the accuracy, accuracy of each class, what was taken for what.
+
+    Raises
+    ------
+    LabelError
+        When a shape has no label, there are fewer than two classes, or one has no shape left to test.
+    ParameterError
+        When vectors and labels do not fit, or a number is below 1.
+
+    Examples
+    --------
+    >>> import numpy as np, spem
+    >>> disks = [spem.synthetic.disk(radius=r, spacing=1.0) for r in (8.0, 9.0, 10.0)]
+    >>> stars = [spem.synthetic.star_polygon(n, 2) for n in (5, 6, 7)]
+    >>> codes = spem.encode(disks + stars, voxels=None, n_centers=8)
+    >>> found = spem.classify(codes, ["disk"] * 3 + ["star"] * 3, n_train=2, repeats=20)
+    >>> found.classes, found.accuracies.size, found.mean > 50
+    (('disk', 'star'), 20, True)
+    """
+    if isinstance(codes, (Codes, str, Path)):
+        collection, classes = _with_classes(codes, labels, ignore_unlabelled=ignore_unlabelled)
+        vectors: ArrayLike = collection.vectors
+    elif isinstance(labels, (str, Path, Mapping)):
+        msg = "vectors have no names to look labels up by; give one label for each, or codes"
+        raise LabelError(msg)
+    else:
+        vectors, classes = codes, list(labels)
+    return classify_vectors(
+        vectors, classes, n_train=n_train, repeats=repeats, classifier=classifier, rng=rng
+    )
 
 
 def row_keys(codes: Codes) -> list[str]:
@@ -171,6 +230,26 @@ def row_keys(codes: Codes) -> list[str]:
     return [
         path if len(held[path]) == 1 else name for name, path in zip(codes.names, codes.paths, strict=True)
     ]
+
+
+def _with_classes(
+    codes: Codes | str | Path,
+    labels: str | Path | Mapping[str, str] | Sequence[Hashable],
+    *,
+    ignore_unlabelled: bool,
+) -> tuple[Codes, list[Hashable]]:
+    """Return codes and the class of each, without those that have none where these are to be ignored."""
+    collection = codes if isinstance(codes, Codes) else Codes.load(codes)
+    if isinstance(labels, (str, Path)):
+        labels = read_labels(labels)
+    if ignore_unlabelled and isinstance(labels, Mapping):
+        collection = collection.take(labelled(row_keys(collection), labels))
+    keys = row_keys(collection)
+    classes: list[Hashable] = [*match_labels(keys, labels)] if isinstance(labels, Mapping) else list(labels)
+    if len(classes) != len(collection):
+        msg = f"{len(classes)} labels for {len(collection)} shapes; give one for each row of the codes"
+        raise LabelError(msg)
+    return collection, classes
 
 
 def _row(codes: Codes, query: str | Path | Shape) -> int | None:
