@@ -35,7 +35,7 @@ AWAY = PAPER_RADIUS / 2
 def make(data: Data) -> Finding:
     """Compare poses of a human, and a hand with its altered instances."""
     humans = data.silhouettes("human", 5)
-    hand = data.silhouettes("hand", 1).shapes[0]
+    hand = data.silhouettes("hand", 2).shapes[1]  # its fingers stand apart
     others = data.silhouettes("cat", 5).shapes
     masks = instances(np.pad(hand.mask, int(3 * PAPER_RADIUS)), np.random.default_rng(0))
     shapes = [*humans.shapes, *others, *(spem.Shape.from_mask(mask) for mask in masks.values())]
@@ -57,7 +57,11 @@ def make(data: Data) -> Finding:
         humans.source.replace("(human)", "(human) and 11 (hand)"),
         (judge_poses(statement, distances, 5, "cats"), robust(away, near)),
         (
-            Picture("human", figure_map_grid(posed, width=0.95), "P₁ to P₆ of a human in five poses."),
+            Picture(
+                "human",
+                figure_map_grid(posed, [f"pose {i + 1}" for i in range(5)], width=0.95),
+                "P₁ to P₆ of a human in five poses.",
+            ),
             Picture("hand", figure_map_grid(list(altered.values()), list(altered)), "P₁ to P₆ of one hand."),
         ),
         numbers,

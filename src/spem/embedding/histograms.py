@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -12,6 +14,28 @@ JUMP = 0.15
 WIDTH = 3
 # The ends of a histogram lie where this share of the values is beyond: rarer values are no region.
 LEAST_SHARE = 0.01
+
+
+def map_limits(values: Sequence[ArrayLike], column: int, beyond: float = 0.001) -> tuple[float, float]:
+    """Return the range of a map over several shapes, but for rare values at both ends.
+
+    Parameters
+    ----------
+    values
+        ``(n_nodes, n_maps)`` maps of each shape.
+    column
+        Which map, from zero.
+    beyond
+        Share of all nodes that is left out at each end.
+
+    Examples
+    --------
+    >>> map_limits([np.arange(101.0)[:, None]], 0, beyond=0.02)
+    (2.0, 98.0)
+    """
+    together = np.concatenate([np.asarray(of_shape)[:, column] for of_shape in values])
+    low, high = np.quantile(together, (beyond, 1 - beyond))
+    return float(low), float(high)
 
 
 def joint_histogram(
@@ -56,30 +80,27 @@ def joint_histogram(
     return np.asarray(counts / columns[0].size)
 
 
-def hellinger_distance(p: ArrayLike, q: ArrayLike) -> float:
-    """Return the Hellinger distance of two histograms: 0 of equal ones, 1 of ones that share no bin.
+def hellinger_distances(histograms: ArrayLike) -> NDArray[np.float64]:
+    """Return the Hellinger distances of histograms: 0 of equal ones, 1 of two that share no bin.
 
     Parameters
     ----------
-    p, q
-        Shares of the bins, of any equal shape; each adds up to 1.
+    histograms
+        ``(n, ...)`` shares of the same bins; each histogram adds up to 1.
 
-    Raises
-    ------
-    ParameterError
-        If they have different bins.
+    Returns
+    -------
+    distances
+        ``(n, n)``.
 
     Examples
     --------
-    >>> hellinger_distance([0.5, 0.5, 0.0], [0.0, 0.0, 1.0])
-    1.0
+    >>> hellinger_distances([[0.5, 0.5, 0.0], [0.5, 0.5, 0.0], [0.0, 0.0, 1.0]]).round(6).tolist()
+    [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0]]
     """
-    first, second = np.asarray(p, np.float64), np.asarray(q, np.float64)
-    if first.shape != second.shape:
-        msg = f"histograms of {first.shape} and {second.shape} bins: count both in the same ones"
-        raise ParameterError(msg)
-    overlap = float(np.sqrt(first * second).sum())
-    return float(np.sqrt(max(0.0, 1.0 - overlap)))
+    shares = np.asarray(histograms, np.float64)
+    roots = np.sqrt(shares.reshape(len(shares), -1))
+    return np.asarray(np.sqrt(np.maximum(0.0, 1.0 - roots @ roots.T)))
 
 
 def first_jumps(values: ArrayLike, bins: int = 64) -> tuple[float, float]:

@@ -81,8 +81,8 @@ def without(mask: Mask, limb: Mask) -> Mask:
     return largest(mask & ~limb)
 
 
-def shortened(mask: Mask, which: Sequence[Mask]) -> Mask:
-    """Return the silhouette with limbs cut to half their reach beyond the trunk.
+def shortened(mask: Mask, which: Sequence[Mask], trunk: Mask | None = None) -> Mask:
+    """Return the silhouette with limbs cut to half their reach.
 
     Parameters
     ----------
@@ -90,6 +90,8 @@ def shortened(mask: Mask, which: Sequence[Mask]) -> Mask:
         The silhouette.
     which
         Some of its `limbs`.
+    trunk
+        What their reach is measured from; by default all that is not the limb, other limbs included.
 
     Examples
     --------
@@ -100,7 +102,7 @@ def shortened(mask: Mask, which: Sequence[Mask]) -> Mask:
     """
     kept = mask
     for limb in which:
-        outward = ndimage.distance_transform_edt(~(mask & ~limb))
+        outward = ndimage.distance_transform_edt(~(mask & ~limb if trunk is None else trunk))
         kept = kept & ~(limb & (outward > KEPT * outward[limb].max()))
     return largest(kept)
 
@@ -225,7 +227,7 @@ def instances(mask: Mask, rng: np.random.Generator) -> dict[str, Mask]:
     return {
         "original": mask,
         "occluded": without(mask, found[0]),
-        "shortened": shortened(mask, found[:3]),
+        "shortened": shortened(mask, found[:3], mask & ~np.any(found, axis=0)),
         "protrusions": protruded(mask, 2, rng),
         "noise": noisy(mask, NOISE["noise"], rng),
     }

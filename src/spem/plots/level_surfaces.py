@@ -37,7 +37,7 @@ def picture_levels(
 ) -> NDArray[np.uint8]:
     """Return a picture of a shape of glass with the surfaces at a lower and at an upper threshold inside.
 
-    What lies below the lower one is blue, above the upper one red.
+    What lies below the lower one is blue, above the upper one red; if both are the same, only red is drawn.
 
     Parameters
     ----------
@@ -123,6 +123,8 @@ def _regions(
     meshes = []
     for sign, level in ((-1.0, thresholds[0]), (1.0, thresholds[1])):
         meshes += iso_surfaces(shape, sign * nodal, [sign * level])
+    if thresholds[0] == thresholds[1]:
+        meshes[0] = (np.empty((0, 3)), np.empty((0, 3), np.int64))
     return meshes
 
 
