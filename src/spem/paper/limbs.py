@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError
-from spem.fields.boundary.sources import point_sources
+from spem.fields.boundary.sources import Sources, point_sources
 from spem.fields.operator import assemble
 from spem.paper.perturbations import limbs
 from spem.shapes.distance import signed_distance
 from spem.shapes.shape import Shape
 
-FINGERS = 5
+# Fingers of a hand; legs and tail of an animal.
+CHAIN = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,42 @@ class Limbs:
         away = np.linalg.norm(points - points[self.core].mean(axis=0), axis=1)
         return int(np.where(self.inside[limb], away, -1.0).argmax())
 
+    def width(self, limb: int) -> float:
+        """Return the area of a limb over its length."""
+        return float(self.inside[limb].sum() * np.prod(self.shape.spacing) / self.length(limb))
+
+    def length(self, limb: int) -> float:
+        """Return how far a limb reaches along the direction in which it is longest."""
+        points = self.shape.points[self.inside[limb]]
+        axis = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
+        return float(np.ptp(points @ axis) + max(self.shape.spacing))
+
+    def touched(self, sources: Sources) -> NDArray[np.bool_]:
+        """Return ``(n_limbs, n_sources)`` True for the sources beside the nodes of each limb."""
+        node, _ = sources.system.domain.boundary_edges
+        found = np.zeros((len(self.inside), sources.n_sources), bool)
+        for row, limb in zip(found, self.inside, strict=True):
+            row[sources.edge_source[limb[node]]] = True
+        return found
+
+
+def main_labels(labels: NDArray[np.integer], members: NDArray[np.bool_]) -> list[int]:
+    """Return the label that most members of each limb have; -1 where most have none.
+
+    Parameters
+    ----------
+    labels
+        ``(n,)`` a part for each node or source, -1 for none.
+    members
+        ``(n_limbs, n)`` which of them belong to each limb.
+
+    Examples
+    --------
+    >>> main_labels(np.array([0, 0, 2, 2, 2]), np.array([[1, 1, 1, 0, 0], [0, 0, 0, 1, 1]], bool))
+    [0, 2]
+    """
+    return [int(np.bincount(labels[limb] + 1).argmax()) - 1 for limb in members]
+
 
 def find_limbs(shape: Shape) -> Limbs:
     """Find the limbs of a silhouette: what opening takes away (`spem.paper.perturbations.limbs`).
@@ -76,18 +113,22 @@ def fingers(shape: Shape) -> Limbs:
         If there are fewer than five limbs.
     """
     found = find_limbs(shape)
-    if len(found.inside) < FINGERS:
-        msg = f"{shape.name}: opening finds {len(found.inside)} limbs; expected a hand with fingers apart"
-        raise ParameterError(msg)
     depth = node_depth(shape)
-    widths = [depth[limb].max() for limb in found.inside]
-    thin = np.sort(np.argsort(widths, kind="stable")[:FINGERS])
-    places = found.places[thin]
-    gaps = np.diff(places, append=places[0] + 1)
-    order = (np.arange(FINGERS) + gaps.argmax() + 1) % FINGERS
-    first, last = gaps[order[0]], gaps[order[-2]]
-    order = thin[order if last > first else order[::-1]]
-    return Limbs(shape, found.inside[order], found.places[order])
+    chain = _chain(found, np.array([depth[limb].max() for limb in found.inside]))
+    gaps = np.diff(chain.places) % 1
+    return chain if gaps[-1] > gaps[0] else Limbs(shape, chain.inside[::-1], chain.places[::-1])
+
+
+def legs_and_tail(shape: Shape) -> Limbs:
+    """Return the five largest limbs of an animal seen from the side, those that head and back lie between.
+
+    Raises
+    ------
+    ParameterError
+        If there are fewer than five limbs.
+    """
+    found = find_limbs(shape)
+    return _chain(found, -found.inside.sum(axis=1))
 
 
 def node_depth(shape: Shape) -> NDArray[np.float64]:
@@ -101,15 +142,23 @@ def node_depth(shape: Shape) -> NDArray[np.float64]:
     return np.asarray(signed_distance(shape)[shape.mask])
 
 
+def _chain(found: Limbs, rank: NDArray[np.floating | np.integer]) -> Limbs:
+    """Keep the five limbs of least rank, in their order from the longest stretch of outline without one."""
+    name, count = found.shape.name, len(found.inside)
+    if count < CHAIN:
+        msg = f"{name}: opening finds {count} limbs; expected a silhouette with {CHAIN} or more apart"
+        raise ParameterError(msg)
+    kept = np.sort(np.argsort(rank, kind="stable")[:CHAIN])
+    places = found.places[kept]
+    gaps = np.diff(places, append=places[0] + 1)
+    order = kept[(np.arange(CHAIN) + gaps.argmax() + 1) % CHAIN]
+    return Limbs(found.shape, found.inside[order], found.places[order])
+
+
 def _places(shape: Shape, inside: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the middle of each limb's stretch of the outer contour, as a share of its length."""
     points = point_sources(assemble(shape, "voxel"))
-    node, _ = points.system.domain.boundary_edges
     outer = points.contour == 0
-    middle = np.empty(len(inside))
-    for i, limb in enumerate(inside):
-        mine = np.zeros(points.n_sources, bool)
-        mine[points.edge_source[limb[node]]] = True
-        turn = 2 * np.pi * np.flatnonzero(mine & outer) / np.count_nonzero(outer)
-        middle[i] = np.angle(np.exp(1j * turn).sum()) / (2 * np.pi) % 1
-    return middle
+    beside = Limbs(shape, inside, np.zeros(len(inside))).touched(points) & outer
+    turn = np.exp(2j * np.pi * np.arange(points.n_sources) / np.count_nonzero(outer))
+    return np.asarray(np.angle(beside @ turn) / (2 * np.pi) % 1)
