@@ -25,6 +25,7 @@ extensions = [
     "names",
     "commands",
     "drawings",
+    "wide",
     "reproduction",
 ]
 exclude_patterns = ["_*", "images", "drawn", "results"]
@@ -44,13 +45,12 @@ napoleon_use_rtype = False
 autosummary_generate = True
 autosummary_ignore_module_all = False
 autodoc_typehints = "description"
-autodoc_typehints_description_target = "documented"
+autodoc_typehints_description_target = "documented_params"
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
 autodoc_class_signature = "mixed"
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 88
-add_module_names = False
 toc_object_entries = False
 
 copybutton_prompt_text = r">>> |\.\.\. |\$ "

@@ -1,11 +1,17 @@
-"""The pages of the documentation say what is so: their code runs, and every public name has its place."""
+"""The documentation says what is so: its code runs, its links lead somewhere, every public name is in it."""
 
 from __future__ import annotations
 
 import doctest
+import os
 import re
 import shlex
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import pytest
 
@@ -16,6 +22,10 @@ DOCS = Path(__file__).parents[1] / "docs"
 PAGES = [DOCS / "start.md", *sorted((DOCS / "guide").glob("*.md"))]
 OPTIONS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 BLOCK = re.compile(r"^```(python|console)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+# Public modules are documented where they are.
+HOMES = {name: f"spem.shapes.{name}" for name in ("creatures", "synthetic")}
+# What a browser fetches by itself; a link waits for the reader.
+FETCHED = {"script": "src", "img": "src", "link": "href", "iframe": "src", "source": "src"}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
@@ -54,3 +64,74 @@ def _run_shell(code, capsys):
             with pytest.raises(SystemExit) as stop:
                 app(words)
             assert stop.value.code == 0, f"{line}\n{capsys.readouterr().err}"
+
+
+class _Page(HTMLParser):
+    """What a page has and what it leads to."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.ids: set[str] = set()
+        self.links: list[str] = []
+        self.fetched: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        """Collect identifiers, links and what is fetched."""
+        found = dict(attrs)
+        self.ids.update(filter(None, (found.get("id"), found.get("name"))))
+        if tag == "a" and found.get("href"):
+            self.links.append(found["href"])
+        if found.get(FETCHED.get(tag, "")):
+            self.fetched.append(found[FETCHED[tag]])
+
+
+def test_site_is_whole(tmp_path):
+    """It is built without a warning; links lead somewhere, nothing comes from elsewhere, search works.
+
+    The scripts of the paper are not run: they have tests of their own.
+    """
+    for module in ("furo", "myst_parser", "sphinx", "sphinx_copybutton", "sphinx_design"):
+        pytest.importorskip(module)
+    site = tmp_path / "site"
+    options = ["-n", "-W", "--keep-going", "-q", "-D", "paper_runs=none", "-d", str(tmp_path / "trees")]
+    command = [sys.executable, "-m", "sphinx", *options, str(DOCS), str(site)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    pages = {path: _Page(path.read_text(encoding="utf-8")) for path in sorted(site.rglob("*.html"))}
+    assert not [wrong for path in pages for wrong in _broken(path, pages)]
+    documented = {found for path, page in pages.items() if path.parent.name == "api" for found in page.ids}
+    wanted = {f"module-{HOMES[name]}" if name in HOMES else f"spem.{name}" for name in spem.__all__}
+    assert not wanted - documented
+    _search(site)
+
+
+def _broken(path, pages):
+    """Say which links and files of a page lead nowhere."""
+    for target in pages[path].fetched + pages[path].links:
+        parts = urlsplit(target)
+        if parts.scheme in ("data", "mailto"):
+            continue
+        if parts.scheme or parts.netloc:
+            if target in pages[path].fetched or not (parts.scheme == "https" and "." in parts.netloc):
+                yield f"{path.name}: {target}"
+            continue
+        other = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+        if not other.is_file():
+            yield f"{path.name}: {target}, no such file"
+        elif parts.fragment and other in pages and unquote(parts.fragment) not in pages[other].ids:
+            yield f"{path.name}: {target}, no such place"
+
+
+def _search(site):
+    """Ask the search page for a word, in a browser where there is one."""
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        assert "vocabulari" in (site / "searchindex.js").read_text(encoding="utf-8")
+        return
+    flags = ["--headless", "--disable-gpu", "--dump-dom", "--virtual-time-budget=20000"]
+    if hasattr(os, "geteuid") and os.geteuid() == 0:
+        flags.append("--no-sandbox")
+    address = (site / "search.html").as_uri() + "?q=vocabulary"
+    found = subprocess.run([browser, *flags, address], capture_output=True, text=True, check=False).stdout
+    assert re.search(r'<a [^>]*href="(?:\./)?guide/search\.html', found)

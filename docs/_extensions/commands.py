@@ -49,10 +49,20 @@ def _prose(document: str) -> str:
     for block in re.split(r"\n\s*\n", document.strip()):
         if block.startswith("\b"):
             title, *lines = block.removeprefix("\b\n").splitlines()
-            blocks.append(f"{title}\n\n```console\n" + "\n".join(f"$ {line.strip()}" for line in lines) + "\n```")
+            blocks += [title, _examples([line.strip() for line in lines])]
         else:
             blocks.append(_plain(" ".join(block.split())))
     return "\n\n".join(blocks)
+
+
+def _examples(lines: list[str]) -> str:
+    """Return example commands as a block; as a list where remarks stand beside them."""
+    pairs = [re.split(r"\s{2,}", line, maxsplit=1) for line in lines]
+    if all(len(pair) == 1 for pair in pairs):
+        return "```console\n" + "\n".join(f"$ {line}" for line in lines) + "\n```"
+    return "\n".join(
+        f"- `{command}`" + "".join(f": {_plain(r)}" for r in remark) for command, *remark in pairs
+    )
 
 
 def _parameters(command: Any, parent: Any) -> list[str]:
@@ -69,7 +79,9 @@ def _parameters(command: Any, parent: Any) -> list[str]:
 
 def _plain(words: str) -> str:
     """Return words with what Markdown would read as markup escaped, but for code."""
+    # A word that begins with two hyphens is an option, not a dash.
+    marked = re.sub(r"(?<![\w`-])--[a-z][\w-]*", r"`\g<0>`", words)
     return "".join(
         part if part.startswith("`") else re.sub(r"([\\*_\[\]<>#$])", r"\\\1", part)
-        for part in re.split(r"(`[^`]*`)", words)
+        for part in re.split(r"(`[^`]*`)", marked)
     )

@@ -65,7 +65,9 @@ def _draw_grid(shape: spem.Shape, ax: Axes, radius: float) -> None:
         stride = int(np.prod(shape.mask.shape[axis + 1 :]))
         start = np.flatnonzero(number[shape.voxels + stride] >= 0)
         end = points[number[shape.voxels[start] + stride]]
-        ax.plot(*np.stack([points[start], end])[:, :, ::-1].transpose(2, 0, 1), color="#c3cad2", lw=0.8, zorder=1)
+        ax.plot(
+            *np.stack([points[start], end])[:, :, ::-1].transpose(2, 0, 1), color="#c3cad2", lw=0.8, zorder=1
+        )
     axis, sign = shape.cuts.direction // 2, 2.0 * (shape.cuts.direction % 2) - 1
     start = points[number[shape.cuts.voxel]]
     end = start.copy()

@@ -3,14 +3,32 @@
 from __future__ import annotations
 
 import re
+from types import GenericAlias
 from typing import Any
 
+import numpy.typing
 from docutils import nodes
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 
 import spem
+
+
+class ArrayLike:
+    """Anything that NumPy makes an array of."""
+
+
+class NDArray:
+    """An array, of a type of numbers."""
+
+    __class_getitem__ = classmethod(GenericAlias)
+
+
+# The aliases that they stand for are printed as what they mean, which is long; modules that use them are
+# imported later.
+for _kind in (ArrayLike, NDArray):
+    setattr(numpy.typing, _kind.__name__, _kind)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -31,9 +49,7 @@ def _resolve(
     for name in _public(target):
         if name in domain.objects:
             role = domain.role_for_objtype(domain.objects[name].objtype)
-            return domain.resolve_xref(
-                env, node["refdoc"], app.builder, role or "obj", name, node, content
-            )
+            return domain.resolve_xref(env, node["refdoc"], app.builder, role or "obj", name, node, content)
     # Types of other packages, and those of ours that are not promised, have no page here.
     return content if node.get("reftype") in ("class", "data", "exc") else None
 

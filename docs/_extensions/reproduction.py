@@ -66,7 +66,9 @@ def write_gallery(docs: Path, runs: str) -> None:
     items = [item for item in ITEMS if _has_script(item)]
     if runs != "none":
         with ProcessPoolExecutor(_PROCESSES) as pool:
-            failures = pool.map(_made, [item.name for item in items], [folder] * len(items), [runs] * len(items))
+            failures = pool.map(
+                _made, [item.name for item in items], [folder] * len(items), [runs] * len(items)
+            )
             for item, failure in zip(items, failures, strict=True):
                 if failure:
                     _log.warning("%s could not be made: %s", item.name, failure)
@@ -84,9 +86,9 @@ def _has_script(item: Item) -> bool:
     return there
 
 
-def _made(name: str, folder: Path, runs: str) -> str:
+def _made(name: str, folder: Path, again: bool) -> str:
     """Run one script in its reduced size on shapes made here, and say why where it failed."""
-    [record] = run(choose([name]), Data(quick=True), folder, again=runs == "all")
+    [record] = run(choose([name]), Data(quick=True), folder, again=again)
     if record.pictures and not record.failure:
         with Image.open(record.folder / record.pictures[0][0]) as picture:
             small = picture.convert("RGB")
@@ -114,7 +116,7 @@ def item_page(item: Item, made: Mapping[str, Any], real: Mapping[str, Any]) -> s
     parts = [
         f".. _paper-{item.name}:\n\n{_heading(title, '=')}",
         f"*Section {item.place} of the paper.*",
-        words,
+        _bars(words),
     ]
     for file, caption in made.get("pictures", ()):
         parts.append(f".. figure:: {item.name}/{file}\n   :alt: {_line(caption)}\n\n   {_line(caption)}")
@@ -130,12 +132,17 @@ def _real(item: Item, real: Mapping[str, Any]) -> str:
         needs = f" It needs {', '.join(f'``{name}``' for name in item.needs)}." if item.needs else ""
         return f"No run on real shapes is recorded.{needs}"
     facts = real["made"]
-    origin = f"spem {facts['spem']}, {facts['seconds']:.0f} s." if facts["seconds"] >= 1 else f"spem {facts['spem']}."
+    origin = (
+        f"spem {facts['spem']}, {facts['seconds']:.0f} s."
+        if facts["seconds"] >= 1
+        else f"spem {facts['spem']}."
+    )
     numbers = json.dumps(real["numbers"], indent=1, ensure_ascii=False)
     parts = [f"{_line(real['shapes'])} {origin}", *map(_claim, real["claims"])]
     if real["numbers"]:
         parts.append(
-            ".. dropdown:: All figures\n\n   .. code-block:: json\n      :class: numbers\n\n" + _indent(numbers, 6)
+            ".. dropdown:: All figures\n\n   .. code-block:: json\n      :class: numbers\n\n"
+            + _indent(numbers, 6)
         )
     return "\n\n".join(parts)
 
@@ -162,8 +169,8 @@ def _script(item: Item) -> str:
     """Return how to run the script, and the script itself."""
     commands = f"$ spem paper {item.name} --data shapes -o out\n$ python examples/{item.name}.py -o out"
     return (
-        f"The first line makes the item in full size, on real shapes where the folder ``shapes`` has them; the "
-        f"second in the reduced size.\n\n.. code-block:: console\n\n{_indent(commands, 3)}\n\n"
+        f"The first line makes the item in full size, on real shapes where the folder ``shapes`` has them; "
+        f"the second in the reduced size.\n\n.. code-block:: console\n\n{_indent(commands, 3)}\n\n"
         f".. literalinclude:: /../examples/{item.name}.py\n   :language: python"
     )
 
@@ -173,10 +180,10 @@ def index_page(pages: Mapping[Item, tuple[Mapping[str, Any], Mapping[str, Any]]]
     real = Counter(claim.verdict for _, found in pages.values() for claim in found.get("claims", ()))
     parts = [
         _heading("The paper, reproduced", "="),
-        "Every figure, table and claim of the paper is one small script, run by ``spem paper``. Pictures here are of "
-        "shapes made by the package itself, in a reduced size; statements are judged on real shapes too, where a "
-        "run is recorded. A verdict follows from the measured numbers; where it differs from the paper the page "
-        "says why.",
+        "Every figure, table and claim of the paper is one small script, run by ``spem paper``. The pictures "
+        "are of shapes made by the package itself, in a reduced size; statements are judged on real shapes "
+        "too, where a run is recorded. A verdict follows from the measured numbers; where it differs from "
+        "the paper the page says why.",
         f"On real shapes: {_counts(real)}." if real else "",
     ]
     for place, group in groupby(pages, lambda item: item.place):
@@ -187,9 +194,7 @@ def index_page(pages: Mapping[Item, tuple[Mapping[str, Any], Mapping[str, Any]]]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def _cards(
-    items: Iterable[Item], pages: Mapping[Item, tuple[Mapping[str, Any], Mapping[str, Any]]]
-) -> str:
+def _cards(items: Iterable[Item], pages: Mapping[Item, tuple[Mapping[str, Any], Mapping[str, Any]]]) -> str:
     """Return a card for each item: picture, title, verdicts."""
     cards = []
     for item in items:
@@ -232,9 +237,16 @@ def _heading(words: str, underline: str) -> str:
     return f"{words}\n{underline * (2 * len(words))}"
 
 
+def _bars(text: str) -> str:
+    """Return text with the bars of absolute values escaped, which would name a substitution."""
+    parts = re.split(r"(`[^`]*`)", text)
+    return "".join(part if part.startswith("`") else part.replace("|", r"\|") for part in parts)
+
+
 def _line(words: str) -> str:
-    """Return plain words on one line, with what would be markup escaped."""
-    return re.sub(r"([\\*`|_<>\[\]])", r"\\\1", " ".join(words.split()))
+    """Return plain words on one line, with what would be markup escaped, and options as code."""
+    escaped = re.sub(r"([\\*`|_<>\[\]])", r"\\\1", " ".join(words.split()))
+    return re.sub(r"(?<![\w-])--[a-z][\w-]*", r"``\g<0>``", escaped)
 
 
 def _indent(block: str, by: int) -> str:
