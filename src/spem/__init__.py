@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from spem.decomposition.transfer import vertex_labels
     from spem.embedding.heat import diffusion_distance, heat_kernel
     from spem.embedding.maps import Maps
-    from spem.embedding.nodal import nodal_domains, nodal_thresholds
+    from spem.embedding.nodal import nodal_clusters, nodal_domains, nodal_thresholds
     from spem.embedding.signatures import (
         heat_kernel_signature,
         scale_invariant_signature,
@@ -150,6 +150,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "level_curvature",
     "maps",
     "match_parts",
+    "nodal_clusters",
     "nodal_domains",
     "nodal_thresholds",
     "node_correlation",
@@ -254,6 +255,7 @@ _HOME = {
     "level_curvature": "spem.fields.level_curves",
     "maps": "spem.api.fields",
     "match_parts": "spem.decomposition.matching",
+    "nodal_clusters": "spem.embedding.nodal",
     "nodal_domains": "spem.embedding.nodal",
     "nodal_thresholds": "spem.embedding.nodal",
     "node_correlation": "spem.decomposition.interactions",

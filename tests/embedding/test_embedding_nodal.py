@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import spem
-from spem.embedding.nodal import nodal_domains, nodal_thresholds
+from spem.embedding.nodal import nodal_clusters, nodal_domains, nodal_thresholds
 from spem.errors import ParameterError
 
 
@@ -22,6 +22,14 @@ def groups(seed: int = 0) -> list[np.ndarray]:
 def test_thresholds_are_the_outer_cluster_means():
     """Three groups of intensities give the means of the lowest and the highest."""
     assert nodal_thresholds(groups()) == pytest.approx(np.array([[-5.0, 8.0]]), abs=0.05)
+
+
+def test_thresholds_midway_hold_whole_clusters():
+    """Cut between the clusters, a domain has as many nodes as its group."""
+    shapes = groups()
+    assert nodal_clusters(shapes) == pytest.approx(np.array([[-5.0, 0.0, 8.0]]), abs=0.05)
+    found = nodal_domains(shapes[0], nodal_thresholds(shapes, at="midway"))
+    assert [(found == side).sum() for side in (-1, 0, 1)] == [30, 100, 60]
 
 
 def test_thresholds_count_every_shape_the_same():
@@ -73,6 +81,8 @@ def test_thresholds_refuse_what_has_no_three_clusters():
         nodal_thresholds([np.array([[0.0], [1.0], [1.0]])])
     with pytest.raises(ParameterError, match="finite values"):
         nodal_thresholds([np.array([[0.0], [np.nan]])])
+    with pytest.raises(ParameterError, match="at='mean' must be one of means, midway"):
+        nodal_thresholds(groups(), at="mean")
 
 
 def test_domains_refuse_thresholds_that_do_not_fit():

@@ -14,7 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from spem.codes.normalise import unit_rms
 from spem.embedding.maps import Maps
-from spem.embedding.nodal import nodal_domains, nodal_thresholds
+from spem.embedding.nodal import Cut, nodal_domains, nodal_thresholds
 from spem.errors import ParameterError, ShapeError, require_kind
 from spem.shapes.shape import Shape
 
@@ -87,6 +87,8 @@ class NodalMoments(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstima
     ----------
     unit
         Whether each projection is brought to unit rms over its shape before it is cut.
+    at
+        Where projections are cut: see `nodal_thresholds`.
     compression
         What is made of moments of very different size: see `hu_moments`.
     nodes_per_shape
@@ -111,11 +113,13 @@ class NodalMoments(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstima
         self,
         *,
         unit: bool = True,
+        at: Cut = "means",
         compression: Compression = "arsinh",
         nodes_per_shape: int = 200,
         random_state: int | RandomState | None = None,
     ) -> None:
         self.unit = unit
+        self.at = at
         self.compression = compression
         self.nodes_per_shape = nodes_per_shape
         self.random_state = random_state
@@ -125,7 +129,7 @@ class NodalMoments(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstima
         _check_compression(self.compression)
         rng = np.random.default_rng(check_random_state(self.random_state).randint(2**31))
         values = [self._intensities(maps) for maps in X]
-        self.thresholds_ = nodal_thresholds(values, nodes_per_shape=self.nodes_per_shape, rng=rng)
+        self.thresholds_ = nodal_thresholds(values, at=self.at, nodes_per_shape=self.nodes_per_shape, rng=rng)
         return self
 
     def transform(self, X: Sequence[Maps]) -> NDArray[np.float64]:

@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import ParameterError
 
+Cut = Literal["means", "midway"]
 _CLUSTERS = 3
 # Starts of k-means, the best of which is kept: on a line they all but always agree.
 _STARTS = 3
 _LARGEST_SEED = 2**32 - 1
 
 
-def nodal_thresholds(
+def nodal_clusters(
     maps: Sequence[ArrayLike], *, nodes_per_shape: int = 200, rng: np.random.Generator | None = None
 ) -> NDArray[np.float64]:
-    """Learn a negative and a positive threshold for each projection, in common for all shapes (5.4).
-
-    The intensities of a projection at nodes of all shapes are put into three clusters by k-means. The lowest
-    and the highest mean are the thresholds: those of the negative and the positive nodal domain, with a
-    cluster near zero between them. A projection of one sign, as the first one is unless centred, has three
-    clusters as well, and its domains are where it is lowest and highest.
+    """Put the intensities of each projection, at nodes of all shapes, into three clusters by k-means (5.4).
 
     Parameters
     ----------
@@ -39,7 +35,7 @@ def nodal_thresholds(
     Returns
     -------
     NDArray
-        ``(n_maps, 2)`` negative and positive threshold of each projection.
+        ``(n_maps, 3)`` cluster means, ascending.
 
     Raises
     ------
@@ -49,12 +45,54 @@ def nodal_thresholds(
 
     Examples
     --------
-    >>> nodal_thresholds([[[-2.0], [0.0], [3.0]], [[-4.0], [0.0], [5.0]]])
-    array([[-3.,  4.]])
+    >>> nodal_clusters([[[-2.0], [0.0], [3.0]], [[-4.0], [0.0], [5.0]]])
+    array([[-3.,  0.,  4.]])
     """
     drawing = np.random.default_rng(0) if rng is None else rng
     nodes = np.concatenate([_draw(values, nodes_per_shape, drawing) for values in _same_maps(maps)])
-    return np.stack([_outer_means(column, j, drawing) for j, column in enumerate(nodes.T)])
+    return np.stack([_cluster_means(column, j, drawing) for j, column in enumerate(nodes.T)])
+
+
+def nodal_thresholds(
+    maps: Sequence[ArrayLike],
+    *,
+    at: Cut = "means",
+    nodes_per_shape: int = 200,
+    rng: np.random.Generator | None = None,
+) -> NDArray[np.float64]:
+    """Learn a negative and a positive threshold for each projection, in common for all shapes (5.4).
+
+    They follow from the clusters of the intensities. A projection of one sign, as the first one is unless
+    centred, has three clusters as well, and its domains are where it is lowest and highest.
+
+    Parameters
+    ----------
+    maps, nodes_per_shape, rng
+        As for `nodal_clusters`.
+    at
+        ``"means"`` cuts at the lowest and the highest cluster mean, as the paper does; ``"midway"`` between
+        these and the middle one, so that a domain holds the nodes of its cluster.
+
+    Returns
+    -------
+    NDArray
+        ``(n_maps, 2)`` negative and positive threshold of each projection.
+
+    Raises
+    ------
+    ParameterError
+        As `nodal_clusters` does, or when `at` is neither.
+
+    Examples
+    --------
+    >>> nodal_thresholds([[[-2.0], [0.0], [3.0]], [[-4.0], [0.0], [5.0]]])
+    array([[-3.,  4.]])
+    """
+    if at not in get_args(Cut):
+        msg = f"at={at!r} must be one of {', '.join(get_args(Cut))}"
+        raise ParameterError(msg)
+    means = nodal_clusters(maps, nodes_per_shape=nodes_per_shape, rng=rng)
+    return means[:, [0, 2]] if at == "means" else (means[:, :2] + means[:, 1:]) / 2
 
 
 def nodal_domains(values: ArrayLike, thresholds: ArrayLike | None = None) -> NDArray[np.int8]:
@@ -92,16 +130,17 @@ def nodal_domains(values: ArrayLike, thresholds: ArrayLike | None = None) -> NDA
     return above.astype(np.int8) - below.astype(np.int8)
 
 
-def _outer_means(column: NDArray[np.floating[Any]], j: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Return the lowest and the highest of the three cluster means of the intensities of a projection."""
+def _cluster_means(
+    column: NDArray[np.floating[Any]], j: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Return the three cluster means of the intensities of a projection, ascending."""
     from sklearn.cluster import KMeans
 
     if np.unique(column).size < _CLUSTERS:
         msg = f"projection {j + 1} has fewer than {_CLUSTERS} different values, so no nodal domains; drop it"
         raise ParameterError(msg)
     kmeans = KMeans(_CLUSTERS, n_init=_STARTS, random_state=int(rng.integers(_LARGEST_SEED)))
-    means = np.sort(kmeans.fit(column[:, None]).cluster_centers_[:, 0])
-    return np.asarray(means[[0, -1]], np.float64)
+    return np.sort(kmeans.fit(column[:, None]).cluster_centers_[:, 0].astype(np.float64))
 
 
 def _draw(
