@@ -28,7 +28,7 @@ STAND_INS = ("human", "octopus", "hand", "ant", "bird", "giraffe")
 def make(data: Data) -> Finding:
     """Compare joint histograms within and between kinds."""
     found = data.collection("shrec11", ndim=3, per_class=2 if data.quick else 5, voxels=4000)
-    shapes = [spem.read(item, voxels=VOXELS) for item in found.items]
+    shapes = [i if isinstance(i, spem.Shape) else spem.read(i, voxels=VOXELS) for i in found.items]
     several = [spem.maps(shape, N_MAPS) for shape in shapes]
     kin = {
         pair: Kinship.of(hellinger_distances(histograms(several, *pair)), found.labels)

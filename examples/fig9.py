@@ -36,8 +36,9 @@ def make(data: Data) -> Finding:
     several, fixed, free = [original], [], []
     for scale in scales[1:]:
         large = scaled(hand, float(scale))
-        several.append(spem.maps(large, N_MAPS, rho=PAPER_RHO, rtol=RTOL))
-        adapted = spem.maps(large, N_MAPS, rho=PAPER_RHO * scale, rtol=RTOL)
+        field = spem.sweep(large, np.linspace(PAPER_RHO[0], PAPER_RHO[-1] * scale), rtol=RTOL)
+        several.append(spem.maps(field.resampled(PAPER_RHO), N_MAPS))
+        adapted = spem.maps(field.resampled(PAPER_RHO * scale), N_MAPS)
         places = hand.points * scale
         fixed.append(signal_to_noise(original.values, values_at(several[-1], places)))
         free.append(signal_to_noise(original.values, values_at(adapted, places)))

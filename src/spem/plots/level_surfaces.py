@@ -71,8 +71,8 @@ def picture_levels(
     >>> picture_levels(shape, shape.points[:, 0], (0.5, 2.5), size=(32, 24)).shape
     (24, 32, 4)
     """
-    rotation = principal_view(shape.points) if view is None else view_rotation(view)
     body = shape_surface(shape)
+    rotation = principal_view(shape.points) if view is None else view_rotation(view)
     ghost = render_surface(body.vertices, body.faces, view=rotation, size=size, colour=SOLID)
     low, high = _regions(shape, values, thresholds)
     # Faces without area are not drawn, but the camera is fitted to them: both pictures have one view.
