@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from spem.embedding.maps import Maps
+    from spem.shapes.shape import Shape
 
 # Width of a panel, and room for a colour bar below and for the names at the left, in inches.
 WIDTH, BAR, NAME = 1.15, 0.3, 0.25
@@ -40,7 +41,7 @@ def figure_map_grid(
     """Return a figure with a row for each shape and a column for each map, as Fig. 13 has them.
 
     All panels of a column share one colour scale about zero, drawn below it, so that the same colour is the
-    same value of the same map in every shape.
+    same value of the same map in every shape. Of one-dimensional shapes they are curves of one scale.
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ def figure_map_grid(
         msg += f" names of {len(several)} shapes"
         raise ParameterError(msg)
     columns = list(range(min(m.values.shape[1] for m in several)) if which is None else which)
-    heights = [width * min(picture_aspect(maps.shape), TALLEST) for maps in several]
+    heights = [width * _aspect(maps.shape) for maps in several]
     figure = new_figure(NAME + width * len(columns), sum(heights) + BAR + 0.25)
     axes = figure.subplots(len(several), len(columns), squeeze=False, height_ratios=heights)
     limits = [
@@ -87,10 +88,16 @@ def figure_map_grid(
             _draw(maps, j, ends, ax)
             if i == 0:
                 ax.set_title(map_name(j), fontsize=TITLE_SIZE)
-        _name(row[0], title)
-    for ends, column in zip(limits, axes.T, strict=True):
-        _bar(figure, list(column), ends)
+        _name(row[0], title, curve=maps.shape.ndim == 1)
+    if several[0].shape.ndim > 1:
+        for ends, column in zip(limits, axes.T, strict=True):
+            _bar(figure, list(column), ends)
     return figure
+
+
+def _aspect(shape: Shape) -> float:
+    """Return the height of a panel over its width; curves need room for their labels."""
+    return 0.9 if shape.ndim == 1 else min(picture_aspect(shape), TALLEST)
 
 
 def _draw(maps: Maps, j: int, limits: tuple[float, float], ax: Axes) -> None:
@@ -110,11 +117,12 @@ def _draw(maps: Maps, j: int, limits: tuple[float, float], ax: Axes) -> None:
     bare(ax)
 
 
-def _name(ax: Axes, title: str) -> None:
+def _name(ax: Axes, title: str, *, curve: bool) -> None:
     """Write the name of a row at its left."""
-    ax.set_axis_on()
-    ax.set(xticks=[], yticks=[])
-    ax.spines[:].set_visible(False)
+    if not curve:
+        ax.set_axis_on()
+        ax.set(xticks=[], yticks=[])
+        ax.spines[:].set_visible(False)
     ax.set_ylabel(title, fontsize=TEXT_SIZE)
 
 
