@@ -124,7 +124,7 @@ def solve_spectrum(
         msg = f"{shape.name}: n_pairs={n_pairs}: expected 1 to {system.n_nodes}, the number of nodes"
         raise ParameterError(msg)
     if boundary == "free":
-        system = _closed(system)
+        system = free_system(system)
     component = system.domain.component
     solved = [
         _component_pairs(system, np.flatnonzero(component == c), int(n_pairs), boundary, solver)
@@ -141,8 +141,26 @@ def solve_spectrum(
     return Spectrum(shape, values[chosen], vectors, boundary)
 
 
-def _closed(system: System) -> System:
-    """Leave the boundary edges out: nothing passes the boundary, which lies on the faces of the voxels."""
+def free_system(system: System) -> System:
+    """Leave the boundary edges out: nothing passes the boundary, which lies on the faces of the voxels.
+
+    Parameters
+    ----------
+    system
+        A and M of a shape, as `assemble` makes them.
+
+    Returns
+    -------
+    System
+        A with A·1 = 0, M the identity, and no right-hand side.
+
+    Examples
+    --------
+    >>> free_system(assemble(Shape.from_mask(np.ones(3)))).matrix().toarray()
+    array([[ 1., -1.,  0.],
+           [-1.,  2., -1.],
+           [ 0., -1.,  1.]])
+    """
     inside = system.domain.neighbours < system.n_nodes
     nothing = np.zeros(system.n_nodes)
     diagonal = inside.astype(np.float64) @ np.repeat(system.weights, 2)
@@ -179,7 +197,7 @@ def _restricted(system: System, nodes: NDArray[Any]) -> System:
 def _signs(vectors: Array) -> Array:
     """Sign that makes the third moment positive, or the largest entry where that is negligible."""
     largest = np.take_along_axis(vectors, np.abs(vectors).argmax(axis=0)[None], axis=0)[0]
-    third = np.sum(vectors**3, axis=0)
-    bound = np.sum(np.abs(vectors) ** 3, axis=0)
+    square = np.square(vectors)
+    third, bound = np.sum(square * vectors, axis=0), np.sum(square * np.abs(vectors), axis=0)
     leading = np.where(np.abs(third) > _SMALL_MOMENT * bound, third, largest)
     return np.where(leading < 0, -1.0, 1.0)

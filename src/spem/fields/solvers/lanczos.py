@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from math import factorial
 
 import numpy as np
 import scipy.linalg
 import scipy.sparse
+import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from spem.errors import ConvergenceError, ParameterError, SizeError
 from spem.fields.operator import System
 from spem.fields.solvers.blas import one_thread
 from spem.fields.solvers.direct import Direct
-from spem.fields.solvers.multifrontal import Factor
+from spem.fields.solvers.protocol import Prepared
 from spem.shapes.limits import memory_limit_bytes
 
 Array = NDArray[np.float64]
 # A block smaller than an eigenspace would see a part of it: reflections and swaps of axes, which maps of
-# grids onto themselves are made of, make spaces of up to d! dimensions. Four-dimensional ones are coarse.
-_BLOCK, _LARGEST_BLOCK = 12, 24
+# grids onto themselves are made of, make spaces of up to d! dimensions. SuperLU is quick with few vectors at
+# a time, the multifrontal factor with more.
+_PLANE_BLOCK, _BLOCK, _LARGEST_BLOCK = 4, 12, 24
 # Below this many nodes for each pair a dense factorisation takes less time than the iteration.
 _DENSE_SHARE, _DENSE_NODES = 4, 400
 # The basis may grow to this many times the number of pairs; three to four times is what is needed.
 _GROWTH = 10
-# The basis grows by this factor between two looks at what has converged.
-_STEP = 1.1
+# When to look at what has converged first, in pairs, and the share by which the basis grows for each decade
+# that the residual has to fall.
+_FIRST_LOOK, _PER_DECADE = 2.5, 0.04
 _SEED = 0
 # What rounding leaves of a residual, on grids of any size that fits.
 _FINEST = 1e-12
@@ -102,22 +105,27 @@ class BlockLanczos:
 
     def _iterate(self, system: System, n_pairs: int, shift: float, root: Array) -> tuple[Array, Array]:
         """Extend the basis by a block after the other until the wanted pairs of the inverse are in it."""
-        width = min(max(_BLOCK, math.factorial(system.shape.ndim)), _LARGEST_BLOCK)
+        plane = system.shape.ndim <= 2
+        width = _PLANE_BLOCK if plane else min(max(_BLOCK, factorial(system.shape.ndim)), _LARGEST_BLOCK)
         capacity = min(system.n_nodes // width, _GROWTH * (n_pairs // width + 4)) * width
         self._check_memory(system, n_pairs, width)
-        factor = Direct(memory_limit=self.memory_limit).prepare(system, shift)
-        krylov = _Krylov.start(factor, root, width, capacity)
+        inverse = (
+            _superlu(system, shift)
+            if plane
+            else Direct(memory_limit=self.memory_limit).prepare(system, shift)
+        )
+        krylov = _Krylov.start(inverse, root, width, capacity)
         matrix = system.matrix(shift)
-        look = 2 * n_pairs + width
+        look = int(_FIRST_LOOK * n_pairs) + width
         while True:
             krylov.extend()
             if krylov.size < min(look, capacity):
                 continue
-            look = int(_STEP * look)
-            inverse, mix, residual = krylov.pairs(n_pairs, matrix)
-            worst = float(residual.max() * inverse[-1])
+            lifted, mix, residual = krylov.pairs(n_pairs, matrix)
+            worst = float(residual.max() * lifted[-1])
             if worst <= self.rtol:
-                return 1 / inverse - shift, krylov.basis[:, : len(mix)] @ mix
+                return 1 / lifted - shift, krylov.basis[:, : len(mix)] @ mix
+            look = int(krylov.size * (1 + _PER_DECADE * np.log10(worst / self.rtol)))
             if krylov.size >= capacity:
                 msg = (
                     f"{system.shape.name}: {n_pairs} eigenpairs have a residual of {worst:.1e} from a basis "
@@ -137,11 +145,22 @@ class BlockLanczos:
             raise SizeError(msg)
 
 
+def _superlu(system: System, shift: float) -> Prepared:
+    """Factor by minimum degree: in the plane there is little to fill in."""
+    factor: Prepared = scipy.sparse.linalg.splu(
+        system.matrix(shift),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+    return factor
+
+
 @dataclass
 class _Krylov:
     """A growing orthonormal basis of blocks Q_j with K Q_j in the span of the next, and Qᵀ K Q."""
 
-    factor: Factor
+    inverse: Prepared
     root: Array
     basis: Array
     projected: Array
@@ -150,19 +169,19 @@ class _Krylov:
     coupling: Array
 
     @classmethod
-    def start(cls, factor: Factor, root: Array, width: int, capacity: int) -> _Krylov:
+    def start(cls, inverse: Prepared, root: Array, width: int, capacity: int) -> _Krylov:
         """Start with random vectors, the same each time."""
         rng = np.random.default_rng(_SEED)
         block = np.linalg.qr(rng.standard_normal((root.size, width)))[0]
         basis = np.empty((root.size, capacity), order="F")
-        return cls(factor, root, basis, np.zeros((capacity, capacity)), block, 0, np.zeros((width, width)))
+        return cls(inverse, root, basis, np.zeros((capacity, capacity)), block, 0, np.zeros((width, width)))
 
     def extend(self) -> None:
         """Add a block to the basis, and make the next of it."""
         m, p = self.size, self.block.shape[1]
         own = slice(m, m + p)
         self.basis[:, own] = self.block
-        image = self.root[:, None] * self.factor.solve(self.root[:, None] * self.block)
+        image = self.root[:, None] * self.inverse.solve(self.root[:, None] * self.block)
         if m:
             before = slice(m - p, m)
             image -= self.basis[:, before] @ self.coupling.T
@@ -182,8 +201,8 @@ class _Krylov:
         With K y = θ y + r, K⁻¹ y − y/θ = −K⁻¹ r/θ, and all r are in the next block.
         """
         m, p = self.size, self.block.shape[1]
-        values, mix = scipy.linalg.eigh(self.projected[:m, :m], subset_by_index=(m - count, m - 1))
-        values, mix = values[::-1], mix[:, ::-1]
+        values, mix = np.linalg.eigh(self.projected[:m, :m])  # faster than a part of the values alone
+        values, mix = values[::-1][:count], mix[:, ::-1][:, :count]
         applied = (matrix @ (self.block / self.root[:, None])) / self.root[:, None]
         ahead = np.linalg.qr(applied, mode="r") @ (self.coupling @ mix[m - p :])
         return values, mix, np.linalg.norm(ahead, axis=0) / values
