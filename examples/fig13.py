@@ -41,7 +41,7 @@ def make(data: Data) -> Finding:
     several = [spem.maps(shape, N_MAPS, rho=PAPER_RHO, rtol=RTOL) for shape in (*found.shapes, *others)]
     cats, n = several[: len(found.shapes)], len(found.shapes)
     distances = distribution_distances(several)
-    marks = [character(maps) for maps in cats]
+    marks = list(map(character, cats))
     table = {name: np.array([mark[name] for mark in marks]) for name in marks[0]}
     numbers = {
         "within_cats": pairs(distances[:n, :n]).mean(axis=0),
@@ -50,20 +50,19 @@ def make(data: Data) -> Finding:
         **table,
     }
     statement = "Projections are consistent across deformations of the cat (5.3, Fig. 13)."
-    picture = figure_map_grid(cats, [f"cat {i + 1}" for i in range(n)])
+    figure = figure_map_grid(cats, [f"pose {i + 1}" for i in range(n)])
     return Finding(
         f"{found.source} Cats are compared with humans and hands of the same source.",
         (judge_poses(statement, distances, n, "humans and hands"), *claims(table)),
-        (Picture("maps", picture, "P₁ to P₅ of a cat in six poses."),),
+        (Picture("maps", figure, "P₁ to P₅ of a cat in six poses."),),
         numbers,
     )
 
 
 def character(maps: spem.Maps) -> dict[str, Any]:
     """Measure what the maps of one cat mark."""
-    shape, values = maps.shape, maps.values
-    depth = signed_distance(shape)[shape.mask]
-    limb = np.any(limbs(shape.mask), axis=0)[shape.mask]
+    mask, values = maps.shape.mask, maps.values
+    depth, limb = signed_distance(maps.shape)[mask], np.any(limbs(mask), axis=0)[mask]
     return {
         "rank_correlation_p1_depth": float(spearmanr(values[:, 0], depth).statistic),
         "p1_positive": float((values[:, 0] > 0).mean()),
@@ -71,7 +70,7 @@ def character(maps: spem.Maps) -> dict[str, Any]:
         "p2_sign_by_depth": separation(depth, values[:, 1] > 0),
         "limbs_at_equal_depth": [separation_at_depth(-column, limb, depth) for column in values.T],
         "limbs_by_depth": separation(-depth, limb),
-        "roughness": roughness(shape, values),
+        "roughness": roughness(maps.shape, values),
     }
 
 
@@ -79,14 +78,14 @@ def claims(table: dict[str, NDArray[np.float64]]) -> tuple[Claim, ...]:
     """Judge what is said of the single maps."""
     rank, rough, limb = table["rank_correlation_p1_depth"], table["roughness"], table["limbs_at_equal_depth"]
     share, sign = table["p2_positive"], table["p2_sign_by_depth"]
-    smooth, third = rough[:, :2].max(), limb[:, 2]
+    smooth, rest, third = rough[:, :2].max(), rough[:, 2:].min(), limb[:, 2]
     return (
         judged(
             "The first two projections are much smoother than the others (5.3).",
             "much smoother",
             f"change from node to node, in standard deviations: P₁, P₂ at most {smooth:.2f}, "
-            f"P₃ to P₅ at least {rough[:, 2:].min():.2f}",
-            bool(smooth < rough[:, 2:].min()),
+            f"P₃ to P₅ at least {rest:.2f}",
+            bool(smooth < rest),
             note="Measured over all nodes, the layer along the boundary among them.",
         ),
         judged(

@@ -29,31 +29,28 @@ N_MAPS = 6
 
 def make(data: Data) -> Finding:
     """Scale a hand, and compare its maps with those of the original."""
-    found = data.silhouettes("hand", 1)
-    hand = found.shapes[0]
+    found = data.silhouettes("hand", 2)
+    hand = found.shapes[1]  # its fingers stand apart
     scales = np.linspace(1, 4, 7 if data.quick else 13)
     original = spem.maps(hand, N_MAPS, rho=PAPER_RHO, rtol=RTOL)
-    several, fixed, free = [original], [], []
+    several, ratios = [original], []
     for scale in scales[1:]:
         large = scaled(hand, float(scale))
         field = spem.sweep(large, np.linspace(PAPER_RHO[0], PAPER_RHO[-1] * scale), rtol=RTOL)
         several.append(spem.maps(field.resampled(PAPER_RHO), N_MAPS))
         adapted = spem.maps(field.resampled(PAPER_RHO * scale), N_MAPS)
-        places = hand.points * scale
-        fixed.append(signal_to_noise(original.values, values_at(several[-1], places)))
-        free.append(signal_to_noise(original.values, values_at(adapted, places)))
-    psnr, scaled_rho = np.array(fixed), np.array(free)
+        there = [values_at(maps, hand.points * scale) for maps in (several[-1], adapted)]
+        ratios.append([signal_to_noise(original.values, values) for values in there])
+    psnr, scaled_rho = np.moveaxis(np.array(ratios), 1, 0)
     shown = {f"scale {s}": several[int(np.abs(scales - s).argmin())] for s in (1, 2, 4)}
     grid = figure_map_grid(list(shown.values()), list(shown))
+    curves = draw(several, scales, psnr, scaled_rho)
+    caption = "Φₙ by scale, and PSNR of the maps; dashed lines peak where the grids coincide."
     return Finding(
         found.source,
         claims(scales[1:], psnr, scaled_rho),
         (
-            Picture(
-                "scales",
-                draw(several, scales, psnr, scaled_rho),
-                "Φₙ by scale, and PSNR of the maps; dashed lines peak where the grids coincide.",
-            ),
+            Picture("scales", curves, caption),
             Picture("maps", grid, "The same hand at scales 1, 2 and 4, drawn in one size; ρ is the same."),
         ),
         {"scale": scales[1:], "psnr_db": psnr, "psnr_db_rho_scaled": scaled_rho},
@@ -68,8 +65,7 @@ def claims(
     # A difference in proportion to the change of scale would lower the ratio by this from step to step.
     slowest = 20 * np.log10((scales[1:] - 1) / (scales[:-1] - 1))[:, None]
     excess = steps - slowest
-    n, at = int(excess.max(axis=0).argmax()), int(excess.max(axis=1).argmax())
-    rising = [map_name(j) for j in range(N_MAPS) if (steps[:, j] <= 0).any()]
+    faster = [map_name(j) for j in range(N_MAPS) if excess[:, j].max() > 0]
     ends = ", ".join(f"{map_name(j)} {psnr[0, j]:.1f} to {psnr[-1, j]:.1f}" for j in range(N_MAPS))
     return (
         judged(
@@ -77,8 +73,8 @@ def claims(
             "monotone from scale 1 to 4",
             f"falls at {100 * (steps > 0).mean():.0f} % of the steps; from scale {scales[0]:g} to 4 in dB: "
             f"{ends}",
-            not rising,
-            note=f"It rises again somewhere in {', '.join(rising)}.",
+            bool((steps > 0).all()),
+            note="It rises again at some step of some projection.",
         ),
         judged(
             "The change is slow: nothing changes abruptly as the scale increases (4.2.1).",
@@ -87,8 +83,8 @@ def claims(
             f"{steps[-1].min():.1f} to {steps[-1].max():.1f}; largest excess over a difference in "
             f"proportion to the change of scale: {excess.max():.1f} dB",
             bool(excess.max() <= 0),
-            note=f"Slow is tested as: the difference grows at most in proportion to the change of scale. The "
-            f"exception is {map_name(n)} at scale {scales[at + 1]:g}; no step is an abrupt one.",
+            note="Slow is tested as: the difference grows at most in proportion to the change of scale; "
+            f"{', '.join(faster)} of {N_MAPS} grows faster at first.",
         ),
         judged(
             "The maps are not scale invariant on a fixed range of ρ (4.2.1).",
