@@ -23,3 +23,15 @@ def test_distance_is_the_limit_of_small_rho():
     assert [claim.verdict for claim in finding.claims] == ["holds"] * 3
     assert all((mean[1:] < mean[:-1]).all() for mean in finding.numbers["mean"].values())
     assert 0.9 < finding.numbers["rates"]["disk"] < 1.2 < finding.numbers["rates"]["rectangle"]
+
+
+def test_geodesics_are_followed_for_small_rho_alone():
+    """Values tend to the inner distance as ρ falls, and directions turn to the ways."""
+    (item,) = choose(["geodesics"])
+    finding = item.make(Data(quick=True))
+    values, towards, _, medial = finding.claims
+    assert (values.verdict, towards.verdict, medial.verdict) == ("holds", "differs", "holds")
+    medians = finding.numbers["angle"]["U"][:, 0]
+    assert 25 < medians[0] < 35
+    assert (medians[1:] < medians[:-1]).all()
+    assert finding.numbers["fast marching, voxels"] < 0.6

@@ -69,7 +69,19 @@ def _update(
 ) -> int:
     """Lower the trial distance of a node and its place in the heap; return the heap's size."""
     axes = _upwind(neighbours, spacing, order, node, distance, place, value, weight)
-    trial = _solve(value[:axes], weight[:axes])
+    return int(_lower(node, _solve(value[:axes], weight[:axes]), distance, heap, place, size))
+
+
+@njit(cache=True, nogil=True)
+def _lower(
+    node: int,
+    trial: float,
+    distance: NDArray[np.float64],
+    heap: NDArray[np.int32],
+    place: NDArray[np.int32],
+    size: int,
+) -> int:
+    """Lower the value of a node where the trial is less, and move it up the heap; return the heap's size."""
     if trial < distance[node]:
         distance[node] = trial
         if place[node] == _FAR:
@@ -250,10 +262,5 @@ def _offer(
     """Let a node take a foot that is nearer than its own; return the heap's size."""
     trial = _squared(position[node], feet[candidate])
     if trial < squared[node]:
-        squared[node], foot[node] = trial, candidate
-        if place[node] == _FAR:
-            heap[size] = node
-            place[node] = size
-            size += 1
-        _sift_up(heap, place, squared, place[node])
-    return size
+        foot[node] = candidate
+    return int(_lower(node, trial, squared, heap, place, size))
