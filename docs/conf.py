@@ -23,6 +23,7 @@ extensions = [
     "sphinx_copybutton",
     "mathml",
     "names",
+    "bars",
     "commands",
     "drawings",
     "wide",

@@ -11,6 +11,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from bars import escape_bars
 from PIL import Image
 from sphinx.application import Sphinx
 from sphinx.util import logging
@@ -116,7 +117,7 @@ def item_page(item: Item, made: Mapping[str, Any], real: Mapping[str, Any]) -> s
     parts = [
         f".. _paper-{item.name}:\n\n{_heading(title, '=')}",
         f"*Section {item.place} of the paper.*",
-        _bars(words),
+        escape_bars(words),
     ]
     for file, caption in made.get("pictures", ()):
         parts.append(f".. figure:: {item.name}/{file}\n   :alt: {_line(caption)}\n\n   {_line(caption)}")
@@ -235,12 +236,6 @@ def _badges(verdicts: Counter[str]) -> str:
 def _heading(words: str, underline: str) -> str:
     """Return a heading; characters may be two columns wide."""
     return f"{words}\n{underline * (2 * len(words))}"
-
-
-def _bars(text: str) -> str:
-    """Return text with the bars of absolute values escaped, which would name a substitution."""
-    parts = re.split(r"(`[^`]*`)", text)
-    return "".join(part if part.startswith("`") else part.replace("|", r"\|") for part in parts)
 
 
 def _line(words: str) -> str:
