@@ -41,20 +41,16 @@ def make(data: Data) -> Finding:
         adapted = spem.maps(field.resampled(PAPER_RHO * scale), N_MAPS)
         there = [values_at(maps, hand.points * scale) for maps in (several[-1], adapted)]
         ratios.append([signal_to_noise(original.values, values) for values in there])
-    psnr, scaled_rho = np.moveaxis(np.array(ratios), 1, 0)
+    psnr, free = np.moveaxis(np.array(ratios), 1, 0)
     shown = {f"scale {s}": several[int(np.abs(scales - s).argmin())] for s in (1, 2, 4)}
     grid = figure_map_grid(list(shown.values()), list(shown))
-    curves = draw(several, scales, psnr, scaled_rho)
-    caption = "Φₙ by scale, and PSNR of the maps; dashed lines peak where the grids coincide."
-    return Finding(
-        found.source,
-        claims(scales[1:], psnr, scaled_rho),
-        (
-            Picture("scales", curves, caption),
-            Picture("maps", grid, "The same hand at scales 1, 2 and 4, drawn in one size; ρ is the same."),
-        ),
-        {"scale": scales[1:], "psnr_db": psnr, "psnr_db_rho_scaled": scaled_rho},
+    curves = draw(several, scales, psnr, free)
+    pictures = (
+        Picture("scales", curves, "Φₙ by scale, and PSNR; dashed lines peak where the grids coincide."),
+        Picture("maps", grid, "The same hand at scales 1, 2 and 4, drawn in one size; ρ is the same."),
     )
+    numbers = {"scale": scales[1:], "psnr_db": psnr, "psnr_db_rho_scaled": free}
+    return Finding(found.source, claims(scales[1:], psnr, free), pictures, numbers)
 
 
 def claims(
@@ -112,8 +108,9 @@ def draw(
         ax.plot(scales[1:], psnr[:, j], color=colour, marker="o", markersize=3, label=map_name(j))
         ax.plot(scales[1:], free[:, j], color=colour, linestyle="--", linewidth=0.8)
     framed(ax, "scale", "PSNR against scale 1 in dB")
+    ax.set_ylim(top=68)
     ax.legend(
-        fontsize=TEXT_SIZE - 1, frameon=False, ncols=3, title="dashed: ρ scaled too", title_fontsize=TEXT_SIZE
+        fontsize=TEXT_SIZE - 1, frameon=False, ncols=3, loc="upper center", title="dashed: ρ scaled too"
     )
     return figure
 

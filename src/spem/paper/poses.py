@@ -131,7 +131,9 @@ def clear_values(maps: Maps, j: int, thresholds: tuple[float, float]) -> NDArray
     True
     """
     shape, values = maps.shape, np.asarray(maps.values[:, j], np.float64)
-    flat = np.clip(values, *thresholds)
+    # Off the thresholds by a hair: surfaces would run through nodes that are on them.
+    hair = 0.01 * (thresholds[1] - thresholds[0])
+    flat = np.clip(values, thresholds[0] + hair, thresholds[1] - hair)
     kept = np.zeros(shape.n_nodes, bool)
     inner = ndimage.distance_transform_edt(shape.mask)[shape.mask] > LAYER
     for beyond in (values < thresholds[0], values > thresholds[1]):
