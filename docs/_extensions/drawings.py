@@ -68,10 +68,10 @@ def _draw_grid(shape: spem.Shape, ax: Axes, radius: float) -> None:
         ax.plot(
             *np.stack([points[start], end])[:, :, ::-1].transpose(2, 0, 1), color="#c3cad2", lw=0.8, zorder=1
         )
-    axis, sign = shape.cuts.direction // 2, 2.0 * (shape.cuts.direction % 2) - 1
+    along, sign = shape.cuts.direction // 2, 2.0 * (shape.cuts.direction % 2) - 1
     start = points[number[shape.cuts.voxel]]
     end = start.copy()
-    end[np.arange(len(end)), axis] += sign * shape.cuts.fraction * spacing[axis]
+    end[np.arange(len(end)), along] += sign * shape.cuts.fraction * spacing[along]
     ax.plot(*np.stack([start, end])[:, :, ::-1].transpose(2, 0, 1), color=COLOURS[1], lw=1.0, zorder=2)
     ax.plot(end[:, 1], end[:, 0], "o", color=COLOURS[1], markersize=3, zorder=3)
     ax.plot(points[:, 1], points[:, 0], "o", color=INK, markersize=3, zorder=3)

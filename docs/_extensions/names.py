@@ -22,7 +22,7 @@ class ArrayLike:
 class NDArray:
     """An array, of a type of numbers."""
 
-    __class_getitem__ = classmethod(GenericAlias)
+    __class_getitem__: Any = classmethod(GenericAlias)
 
 
 # The aliases that they stand for are printed as what they mean, which is long; modules that use them are

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import re
 from collections import Counter
@@ -167,12 +168,14 @@ def _claim(claim: Claim) -> str:
 
 
 def _script(item: Item) -> str:
-    """Return how to run the script, and the script itself."""
+    """Return how to run the script, and the script itself without the words that stand above."""
     commands = f"$ spem paper {item.name} --data shapes -o out\n$ python examples/{item.name}.py -o out"
+    first = ast.parse(item.script.read_text(encoding="utf-8")).body[1].lineno
     return (
         f"The first line makes the item in full size, on real shapes where the folder ``shapes`` has them; "
         f"the second in the reduced size.\n\n.. code-block:: console\n\n{_indent(commands, 3)}\n\n"
-        f".. literalinclude:: /../examples/{item.name}.py\n   :language: python"
+        f":download:`{item.name}.py </../examples/{item.name}.py>`\n\n"
+        f".. literalinclude:: /../examples/{item.name}.py\n   :language: python\n   :lines: {first}-"
     )
 
 
