@@ -21,7 +21,7 @@ from spem.shapes.shape import Shape
 SIDE_VIEW = (18.0, 118.0)
 # Pictures leave out what is nearer to the boundary than so many voxels, where the layers of higher maps are
 # thinner than the grid, and pieces smaller than this share of the nodes.
-LAYER, LEAST_PIECE = 1.5, 0.002
+LAYER, LEAST_PIECE = 1.5, 0.0005
 
 
 @dataclass(frozen=True, eq=False)
