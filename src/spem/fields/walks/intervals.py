@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -104,6 +104,10 @@ class Estimate:
             raise ParameterError(msg)
         near = np.clip(given, 0.0, 1.0)
         return np.asarray((self.lower <= near) & (near <= self.upper))
+
+    def alone(self) -> Estimate:
+        """Return the same counts with intervals that hold each by itself."""
+        return replace(self, comparisons=1)
 
     @property
     def _tail(self) -> float:
