@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import doctest
+import importlib.util
+import json
 import os
 import re
 import shlex
@@ -135,3 +137,42 @@ def _search(site):
     address = (site / "search.html").as_uri() + "?q=vocabulary"
     found = subprocess.run([browser, *flags, address], capture_output=True, text=True, check=False).stdout
     assert re.search(r'<a [^>]*href="(?:\./)?guide/search\.html', found)
+
+
+@pytest.fixture
+def record():
+    """Return the script that keeps what a run on real shapes found."""
+    spec = importlib.util.spec_from_file_location("record", DOCS / "record.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def _finding(folder, **made):
+    """Write what a run of the first item may have left."""
+    origin = {"spem": "1", "script": "a", "quick": False, "data": ["tari1000"], "seconds": 1.0} | made
+    claim = {"statement": "It grows.", "paper": "grows", "ours": "grows", "verdict": "holds", "note": ""}
+    numbers = {"share": 0.123456789, "values": [[0.5] * 40] * 40}
+    found = {"shapes": "Hands.", "claims": [claim], "numbers": numbers, "made": origin, "pictures": ["x.png"]}
+    (folder / "fig1").mkdir(parents=True)
+    (folder / "fig1" / "finding.json").write_text(json.dumps(found), encoding="utf-8")
+
+
+def test_record_keeps_claims_and_numbers_alone(tmp_path, record):
+    """Neither pictures nor what is too long to read is kept, and numbers have few digits."""
+    _finding(tmp_path / "out")
+    record.main(tmp_path / "out", tmp_path / "results")
+    [path] = (tmp_path / "results").iterdir()
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    assert set(kept) == {"shapes", "claims", "numbers", "made"}
+    assert kept["numbers"] == {"share": 0.12346}
+    assert kept["claims"][0]["verdict"] == "holds"
+
+
+@pytest.mark.parametrize("made", [{"quick": True}, {"data": None}], ids=["reduced size", "no real shapes"])
+def test_record_leaves_out_what_is_not_of_real_shapes(made, tmp_path, record, capsys):
+    """A run in the reduced size or without real shapes leaves no record, and is told."""
+    _finding(tmp_path / "out", **made)
+    record.main(tmp_path / "out", tmp_path / "results")
+    assert not list((tmp_path / "results").iterdir())
+    assert "fig1: left out" in capsys.readouterr().out
