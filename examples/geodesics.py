@@ -9,9 +9,9 @@ of them: the difference is O(ρ), times a logarithm.
 
 Do gradients of v point along the shortest ways, as 3.2 says? For small ρ they do. For ρ = ∞ they do not:
 walls where v = 0 swallow walkers, so that v is greatest along the middle of a limb, and ∇v leads to this
-medial locus as well as to p. The paper says both; the angles below tell how much there is of each. (Varadhan's
-formula has a sign too many there, −√(−4t log p): it is √(−4t log p) that tends to the distance. Neither a
-logarithm nor a square root turns a gradient.)
+medial locus as well as to p. The paper says both; the angles below tell how much there is of each.
+(Varadhan's formula has a sign too many there, −√(−4t log p): it is √(−4t log p) that tends to the distance.
+Neither a logarithm nor a square root turns a gradient.)
 """
 
 import numpy as np

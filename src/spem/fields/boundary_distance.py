@@ -15,13 +15,15 @@ from spem.shapes.shape import Shape
 _SIDES = 0.7
 # A cut's plane is taken where it is met within this many voxels of the cut; cuts are about one apart.
 _REACH = 1.5
+# Cuts that lie farther than this, in voxels, off their plane are at an edge, where no plane is taken.
+_FLAT = 0.1
 
 
 def distance_to_boundary(shape: Shape) -> NDArray[np.float64]:
     """Return the Euclidean distance from the nodes to the surface, as the cuts have it.
 
     Through each cut goes a plane, fitted to the cuts around it. A node's distance is that to the plane of
-    its nearest cut, or to the cut where the plane is met farther off, round a corner. Second order where
+    its nearest cut; or to the cut, where cuts lie round an edge or the plane is met farther off. Second order where
     the surface is smooth.
 
     Parameters
@@ -53,12 +55,13 @@ def distance_to_boundary(shape: Shape) -> NDArray[np.float64]:
     outward[np.arange(node.size), direction // 2] = 2.0 * (direction % 2) - 1.0
     cuts = points[node] + outward * step * domain.fraction[:, None]
     beside = _beside(cuts, outward, float(step.max()))
-    normal = _normals(cuts[beside], outward)
+    normal, off = _planes(cuts[beside], outward)
     foot = spread(points, domain.neighbours, node, cuts, beside)
     way = cuts[foot] - points
     squared = np.einsum("nd,nd->n", way, way)
     along = np.einsum("nd,nd->n", way, normal[foot])
     on_plane = (along > 0) & (squared - along**2 <= (_REACH * step.max()) ** 2)
+    on_plane &= off[foot] < _FLAT * step.max()
     return np.asarray(np.where(on_plane, along, np.sqrt(squared)))
 
 
@@ -111,9 +114,13 @@ def _beside(cuts: NDArray[np.float64], outward: NDArray[np.float64], step: float
     return np.asarray(near.reshape(len(cuts), count))
 
 
-def _normals(cuts: NDArray[np.float64], outward: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return unit outward normals ``(n, d)`` of the planes fitted to groups of cuts ``(n, k, d)``."""
+def _planes(
+    cuts: NDArray[np.float64], outward: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fit planes to groups of cuts ``(n, k, d)``: unit outward normals, and root mean squares off the planes."""
     about_mean = cuts - cuts.mean(axis=1, keepdims=True)
-    _, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", about_mean, about_mean))
+    values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", about_mean, about_mean))
     normal = vectors[:, :, 0]
-    return np.asarray(np.where(np.einsum("nd,nd->n", normal, outward) < 0, -1.0, 1.0)[:, None] * normal)
+    sign = np.where(np.einsum("nd,nd->n", normal, outward) < 0, -1.0, 1.0)
+    off = np.sqrt(np.maximum(values[:, 0], 0.0) / cuts.shape[1])
+    return sign[:, None] * normal, off
