@@ -224,3 +224,15 @@ def test_wrong_arguments_are_refused():
         Walk(walk.system, 1.0, np.full(9, np.nan), np.zeros(12))
     with pytest.raises(ParameterError, match="grows by more than 1e308"):
         Walk(walk.system, 1.0, np.linspace(0, 9000, 9), np.zeros(12))
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("file", ["tari1000/obj11_1.png", "kimia216", "horse_poses/1.obj"])
+def test_estimates_hold_the_solution_on_real_shapes(data_dir, file):
+    """Silhouettes and an open mesh, with the surface where it was found."""
+    path = data_dir / file
+    shape = spem.read(sorted(path.glob("*.png"))[0] if path.is_dir() else path, voxels=1500)
+    rho, rng = 0.1 * shape.size, np.random.default_rng(7)
+    nodes = rng.choice(shape.n_nodes, 12, replace=False)
+    found = estimate_field(shape, rho, nodes=nodes, n_walks=4000, rng=rng, comparisons=36)
+    assert found.covers(spem.field(shape, rho, solver=spem.Direct())[nodes]).all()

@@ -150,3 +150,13 @@ def test_wrong_arguments_are_refused():
         solve_transient(shape, 1.0, "soon")
     with pytest.raises(ParameterError, match=r"rod: a field at time 0 is one finite number or \(4,\)"):
         solve_transient(shape, 1.0, [1.0], start=[0.0, 1.0])
+
+
+def test_lowest_rate_is_the_lowest_value_of_the_spectrum():
+    """Found by inverse iteration here, among all of them by a dense solver."""
+    shape = disk(6.0, 1.0, offset=0.2)
+    for boundary in ("surface", "voxel"):
+        system = assemble(shape, boundary)
+        root = np.sqrt(system.mass)
+        values = np.linalg.eigvalsh(system.matrix().toarray() / root[:, None] / root)
+        assert np.isclose(decay_rate(system, np.inf), values[0], rtol=1e-10)
