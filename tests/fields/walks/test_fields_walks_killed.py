@@ -231,7 +231,7 @@ def test_wrong_arguments_are_refused():
 def test_estimates_hold_the_solution_on_real_shapes(data_dir, file):
     """Silhouettes and an open mesh, with the surface where it was found."""
     path = data_dir / file
-    shape = spem.read(sorted(path.glob("*.png"))[0] if path.is_dir() else path, voxels=1500)
+    shape = spem.read(min(path.glob("*.png")) if path.is_dir() else path, voxels=1500)
     rho, rng = 0.1 * shape.size, np.random.default_rng(7)
     nodes = rng.choice(shape.n_nodes, 12, replace=False)
     found = estimate_field(shape, rho, nodes=nodes, n_walks=4000, rng=rng, comparisons=36)
