@@ -27,7 +27,7 @@ def estimate_field(
     """Estimate v at some nodes as the share of random walks that reach the boundary (3.1).
 
     Walks are bounded by nothing but their ends: a walk takes `expected_steps` steps on average, up to the
-    square of the shape's width in voxels, at some 5 ns each. Each node has a stream of random numbers of its
+    square of the shape's width in voxels, at some 7 ns each. Each node has a stream of random numbers of its
     own, so its walks do not depend on which other nodes come after it.
 
     Parameters
