@@ -2,14 +2,14 @@
 Figure 1: the field for different ρ
 ===================================
 
-The field v solves Δv − v/ρ² = 0 inside a shape, with v = 1 on its boundary (1.1). It falls from the boundary
-inward, and the screening length ρ says how fast: far from corners like exp(−depth/ρ). A small ρ sees what is
-close to the boundary, protrusions and indentations, and knows nothing of the middle; a large one couples the
-whole of the shape (2.1).
+The field v solves Δv − v/ρ² = 0 inside a shape, with v = 1 on its boundary (1.1). It falls from the
+boundary inward, and the screening length ρ says how fast: far from corners like exp(−depth/ρ). A small ρ
+sees what is close to the boundary, protrusions and indentations, and knows nothing of the middle; a large
+one couples the whole of the shape (2.1).
 
-How far a value looks is measured by taking the boundary apart. v(x) is a sum over boundary points (2.3), and
-the share in it of points that lie much farther away than the nearest one, by an inner radius or more, is what
-the value knows of the rest of the shape.
+How far a value looks is measured by taking the boundary apart. v(x) is a sum over boundary points (2.3),
+and the share in it of points that lie much farther away than the nearest one, by an inner radius or more,
+is what the value knows of the rest of the shape.
 """
 
 import numpy as np
@@ -35,11 +35,11 @@ def make(data: Data) -> Finding:
     """Solve for a few ρ on a cat; measure how deep each reaches and from how far."""
     found = chosen(data, "cat")
     cat = found.shapes[0]
-    fields, depth = spem.field(cat, RHO), node_depth(cat)
+    fields, depth = np.asarray(spem.field(cat, RHO), np.float64), node_depth(cat)
     grows = float((np.diff(fields, axis=1) > 0).mean())
     middle = fields[depth >= np.quantile(depth, 0.9)].mean(axis=0)
     half = [float(depth[column > 0.5].max(initial=0.0)) for column in fields.T]
-    far = far_shares(cat, (*RHO, np.inf))
+    far = far_shares(spem.sources(cat, 200 if data.quick else None), (*RHO, np.inf))
     claims = (
         judged(
             "v grows with ρ at every node: a larger ρ carries the boundary further inward (2.1).",
@@ -56,8 +56,9 @@ def make(data: Data) -> Finding:
         Picture(
             "reach",
             figure_reach(depth, fields, far),
-            "Left: mean v at each depth; dashed, exp(−depth/ρ), the fall from a straight boundary. Right: how "
-            "much of v comes from boundary points that are an inner radius farther away than the nearest.",
+            "Left: mean v at each depth; dashed, exp(−depth/ρ), the fall from a straight boundary. Right: "
+            "how much of v comes from boundary points that are an inner radius farther away than the "
+            "nearest.",
         ),
     )
     numbers = {"rho": RHO, "grows": grows, "middle": middle, "half_depth": half, "far_share": far}
@@ -69,8 +70,8 @@ def reach_claims(middle: NDArray[np.float64], half: list[float], far: list[float
     small = judged(
         "A small ρ² shows what is close to the boundary and is clueless about the central part (2.1).",
         "clueless about the centre",
-        f"at ρ = {RHO[0]:g} v is above 1/2 no deeper than {half[0]:.1f} pixels and {middle[0]:.3f} on average "
-        f"in the deepest tenth of the nodes; {100 * far[0]:.2f} % of v comes from far boundary",
+        f"at ρ = {RHO[0]:g} v is above 1/2 no deeper than {half[0]:.1f} pixels and {middle[0]:.3f} on "
+        f"average in the deepest tenth of the nodes; {100 * far[0]:.2f} % of v comes from far boundary",
         bool(middle[0] < LITTLE and far[0] < LITTLE),
         note=f"The shape is too thin for ρ = {RHO[0]:g} to be small.",
     )
@@ -86,10 +87,9 @@ def reach_claims(middle: NDArray[np.float64], half: list[float], far: list[float
     return small, large
 
 
-def far_shares(shape: spem.Shape, several: tuple[float, ...]) -> list[float]:
+def far_shares(sources: spem.Sources, several: tuple[float, ...]) -> list[float]:
     """Return the mean share in v of boundary points much farther away than the nearest, for each ρ."""
-    sources = spem.sources(shape)
-    away = cdist(sources.position, shape.points)
+    away = cdist(sources.position, sources.system.shape.points)
     far = away > away.min(axis=0) + INNER_RADIUS
     shares = []
     for rho in several:

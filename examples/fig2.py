@@ -3,12 +3,12 @@ Figure 2: what a value knows beyond its distance to the boundary
 ================================================================
 
 At a fixed node, v as a function of ρ is a curve from 0 to 1, its profile. Nodes of distinct character have
-distinct profiles (2.2): one in the middle of a hand, one in a finger, some near the side of the palm. Two of
-them, one in a finger and one in the palm, are equally far from the boundary. A distance transform gives both
-the same number; their profiles differ, because in the finger the boundary is near on two sides.
+distinct profiles (2.2): one in the middle of a hand, one in a finger, some near the side of the palm. Two
+of them, one in a finger and one in the palm, are equally far from the boundary. A distance transform gives
+both the same number; their profiles differ, because in the finger the boundary is near on two sides.
 
-The nodes are chosen by rule: the deepest one; nodes of the palm at two thirds and one third of its depth; the
-deepest one in the middle of the longest finger; and the node of the palm as deep as that.
+The nodes are chosen by rule: the deepest one; nodes of the palm at two thirds and one third of its depth;
+the deepest one in the middle of the longest finger; and the node of the palm as deep as that.
 """
 
 from itertools import combinations
@@ -50,8 +50,8 @@ def make(data: Data) -> Finding:
     deep = f"{depth[nodes[FINGER]]:.2f} and {depth[nodes[TWIN]]:.2f}"
     claims = (
         judged(
-            "Two nodes, in a finger and in the palm, that are about equally far from the boundary have profiles "
-            "that are close yet not identical, because the finger is thin (2.2).",
+            "Two nodes, in a finger and in the palm, that are about equally far from the boundary have "
+            "profiles that are close yet not identical, because the finger is thin (2.2).",
             "not nearly identical",
             f"{deep} pixels deep, their profiles differ by up to {pair.max():.2f} (at ρ = {rho:.1f}), "
             f"{ratio:.0f} times what the difference in distance explains",
@@ -61,9 +61,9 @@ def make(data: Data) -> Finding:
         judged(
             "Of all profiles, those two are the closer ones, for their comparable distance (2.2).",
             "closer profiles",
-            f"mean difference of the finger's profile from that of its twin {pair.mean():.3f}, from the others "
-            f"at least {others.min():.3f}; of all pairs, {NAMES[nearest[0]]!r} and {NAMES[nearest[1]]!r} are "
-            f"the closest ({apart[nearest].mean():.3f})",
+            f"mean difference of the finger's profile from that of its twin {pair.mean():.3f}, from the "
+            f"others at least {others.min():.3f}; of all pairs, {NAMES[nearest[0]]!r} and "
+            f"{NAMES[nearest[1]]!r} are the closest ({apart[nearest].mean():.3f})",
             bool(pair.mean() < others.min()),
             note="A thin part changes a profile by more than a difference in distance does.",
         ),

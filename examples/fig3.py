@@ -2,27 +2,27 @@
 Figure 3: equally far from the boundary, and yet not the same
 =============================================================
 
-Take the nodes of a hand that are equally far from its boundary. A distance transform cannot tell them apart;
-v can, since each has its own neighbourhood (2.2). Each of them has a profile over ρ of its own.
+Take the nodes of a hand that are equally far from its boundary. A distance transform cannot tell them
+apart; v can, since each has its own neighbourhood (2.2). Each of them has a profile over ρ of its own.
 
 How much of the spread is real? A grid has few nodes at exactly one distance, so nodes are taken within a
 quarter of a pixel, and the spread of v in this band is held against the spread that the band's own width
-brings about: the standard deviation of the distance times the mean fall of v per pixel of distance. A ratio of
-one would mean that v knows the distance and nothing else. A disk, where it does, is the control. The same is
-done along the curve of exactly this distance, found between the nodes, where only the error of finding it is
-left to be explained.
+brings about: the standard deviation of the distance times the mean fall of v per pixel of distance. A ratio
+of one would mean that v knows the distance and nothing else. A disk, where it does, is the control. The
+same is done along the curve of exactly this distance, found between the nodes, where only the error of
+finding it is left to be explained.
 """
+
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
-from scipy.ndimage import distance_transform_edt
 
 import spem
-from spem.fields.isocontours import iso_contours
 from spem.paper.data import INNER_RADIUS, Data
+from spem.paper.equidistance import BAND, band, spread_along_curve, spread_ratios
 from spem.paper.findings import Finding, Picture, Table, judged
 from spem.paper.limbs import node_depth
 from spem.paper.present import present
@@ -31,12 +31,11 @@ from spem.plots.fields import draw_outline
 from spem.plots.style import DASHES, INK, TEXT_SIZE, bare, framed, new_figure
 
 RHO = np.linspace(2, 30, 57)
-BAND = 0.25
 DEPTHS = (2, 3, 4, 6, 8)
 SHOWN = 4
 N_CURVES = 12
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 
 
 def make(data: Data) -> Finding:
@@ -44,19 +43,20 @@ def make(data: Data) -> Finding:
     found = chosen(data, "hand")
     hand, disk = found.shapes[0], spem.synthetic.disk(INNER_RADIUS, 1.0)
     fields = {shape.name: spem.sweep(shape, RHO).fields() for shape in (hand, disk)}
-    ratio = {shape.name: ratios(shape, fields[shape.name], SHOWN) for shape in (hand, disk)}
-    exact = {shape.name: along_curve(shape, fields[shape.name], SHOWN) for shape in (hand, disk)}
-    table = [(depth, ratios(hand, fields[hand.name], depth)) for depth in DEPTHS]
+    ratio = {shape.name: spread_ratios(shape, fields[shape.name], SHOWN) for shape in (hand, disk)}
+    exact = {shape.name: spread_along_curve(shape, fields[shape.name], SHOWN) for shape in (hand, disk)}
+    table = [(depth, spread_ratios(hand, fields[hand.name], depth)) for depth in DEPTHS]
     here, there = ratio[hand.name], ratio[disk.name]
     mean = {name: float(values.mean()) for name, values in exact.items()}
     claim = judged(
-        "Profiles v(ρ) of nodes that have the same distance to the boundary show quite different character: the "
-        "field encodes more than the distance (2.2).",
+        "Profiles v(ρ) of nodes that have the same distance to the boundary show quite different "
+        "character: the field encodes more than the distance (2.2).",
         "quite different character",
-        f"{SHOWN} pixels deep, the spread of v is {here['sub-voxel'].min():.1f} to {here['sub-voxel'].max():.1f} "
-        f"times what the width of the band explains (pixels' distances: {here['pixel'].min():.1f} to "
-        f"{here['pixel'].max():.1f}), on a disk {there['sub-voxel'].max():.1f} at most; at exactly equal "
-        f"distance the standard deviation of v is {mean[hand.name]:.3f}, on the disk {mean[disk.name]:.4f}",
+        f"{SHOWN} pixels deep, the spread of v is {here['sub-voxel'].min():.1f} to "
+        f"{here['sub-voxel'].max():.1f} times what the width of the band explains (pixels' distances: "
+        f"{here['pixel'].min():.1f} to {here['pixel'].max():.1f}), on a disk "
+        f"{there['sub-voxel'].max():.1f} at most; at exactly equal distance the standard deviation of v is "
+        f"{mean[hand.name]:.3f}, on the disk {mean[disk.name]:.4f}",
         bool(here["sub-voxel"].min() > 2 and here["pixel"].min() > 2),
         note="At some ρ the spread is no more than twice what the band's width explains.",
     )
@@ -81,36 +81,6 @@ def make(data: Data) -> Finding:
         tables=(Table(caption, head, rows),),
         numbers={"rho": RHO, "hand": here, "disk": there, "exact_hand": exact[hand.name], "exact": mean},
     )
-
-
-def band(depth: Array, at: float) -> NDArray[np.bool_]:
-    """Nodes of one depth, within the band."""
-    return np.abs(depth - at) <= BAND
-
-
-def ratios(shape: spem.Shape, fields: Array, at: float) -> dict[str, Array]:
-    """Return for each ρ the spread of v in a band of depth over what the depths in it explain.
-
-    Depths are those below the surface, between the voxels, or of the pixels' distance transform.
-    """
-    found = {}
-    whole = distance_transform_edt(shape.mask)[shape.mask]
-    for kind, depth in (("sub-voxel", node_depth(shape)), ("pixel", whole)):
-        # The mean fall over two pixels: a band itself is too narrow for its slope to be known.
-        near = np.abs(depth - at) <= 1
-        slope = np.polyfit(depth[near], fields[near], 1)[0]
-        mine = band(depth, at)
-        # Distances of pixels repeat, but are no better known for it: at least as if evenly spread.
-        width = max(float(depth[mine].std()), BAND / np.sqrt(3))
-        found[kind] = fields[mine].std(axis=0) / np.abs(slope * width)
-    return found
-
-
-def along_curve(shape: spem.Shape, fields: Array, at: float) -> Array:
-    """Return for each ρ the standard deviation of v along the curve of one depth."""
-    lines = iso_contours(shape, node_depth(shape), [at])[0]
-    values = shape.to_grid(fields, 1.0)
-    return np.asarray(RegularGridInterpolator(shape.axes, values)(np.vstack(lines)).std(axis=0))
 
 
 def figure_spread(hand: spem.Shape, fields: Array, ratio: Array, control: Array) -> Figure:

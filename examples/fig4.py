@@ -2,9 +2,9 @@
 Figure 4: superposition in one dimension
 ========================================
 
-The equation is linear. On an interval the boundary is two points, and the field of both, v = 1 at either end,
-is the sum of two fields that have 1 at one end and 0 at the other (2.2, 2.3). Rows differ in ρ: the shorter it
-is, the less an end sees of the other.
+The equation is linear. On an interval the boundary is two points, and the field of both, v = 1 at either
+end, is the sum of two fields that have 1 at one end and 0 at the other (2.2, 2.3). Rows differ in ρ: the
+shorter it is, the less an end sees of the other.
 """
 
 import numpy as np
@@ -33,7 +33,8 @@ def make(data: Data) -> Finding:
     error = np.abs(sums - whole).max(axis=0)
     against_exact = np.abs(sums - exact).max(axis=0)
     claim = judged(
-        "The solution for the sum of two boundary conditions is the sum of their solutions, for each ρ (2.3).",
+        "The solution for the sum of two boundary conditions is the sum of their solutions, for each ρ "
+        "(2.3).",
         "superpositions of the pair of solutions on the respective row",
         f"the sums differ from the field of both ends by at most {error.max():.0e}, and from "
         f"cosh(x/ρ)/cosh(L/2ρ) by {against_exact.max():.0e}",

@@ -2,13 +2,14 @@
 Figure 5: the field of one boundary point
 =========================================
 
-Light up one point of the boundary, on the tip of the little finger, and leave the rest dark (2.2). Its field
-falls so steeply that only its logarithm can be seen. It falls along every finger and hardly across the palm:
-in a strip of width w the slowest fall is exp(−π s/w), with or without screening, because a walk that sets out
-from the source is lost at the sides. So the logarithm measures a distance in which fingers are long and the
-palm is small: parts come apart (2.3, 3.2).
+Light up one point of the boundary, on the tip of the little finger, and leave the rest dark (2.2). Its
+field falls so steeply that only its logarithm can be seen. It falls along every finger and hardly across
+the palm: in a strip of width w the slowest fall is exp(−π s/w), with or without screening, because a walk
+that sets out from the source is lost at the sides. So the logarithm measures a distance in which fingers
+are long and the palm is small: parts come apart (2.3, 3.2).
 
-Streamlines follow the gradient from all over the hand to the source. They keep to the middle of the fingers.
+Streamlines follow the gradient from all over the hand to the source. They keep to the middle of the
+fingers.
 """
 
 import numpy as np
@@ -20,7 +21,7 @@ from spem.fields.gradients import source_gradient
 from spem.fields.superposition.fields import SourceFields
 from spem.paper.data import Data
 from spem.paper.findings import Claim, Finding, Picture, judged
-from spem.paper.limbs import Limbs, fingers
+from spem.paper.limbs import fingers
 from spem.paper.present import present
 from spem.paper.silhouettes import chosen
 from spem.plots.sources import figure_source
@@ -42,22 +43,19 @@ def make(data: Data) -> Finding:
     fields = spem.source_fields(every.select([int(tip[0]), int(away.argmax())]))
     steep = np.linalg.norm(source_gradient(fields, 0), axis=1)
     over = {"fingers": float(np.median(steep[~limbs.core])), "palm": float(np.median(steep[limbs.core]))}
-    slopes = [slope(fields, source) for source in (0, 1)]
-    width = limbs.width(LITTLE)
-    window = limb_window(limbs, THUMB)
+    slopes, width = [slope(fields, source) for source in (0, 1)], limbs.width(LITTLE)
     pictures = (
         Picture(
             "field",
-            figure_source(fields, 0, window=window),
-            "Left: log v of a source on the little finger, with lines of equal value; middle: directions of its "
-            "gradient in the thumb; right: streamlines to the source.",
+            figure_source(fields, 0, window=limbs.window(THUMB)),
+            "Left: log v of a source on the little finger, with lines of equal value; middle: directions "
+            "of its gradient in the thumb; right: streamlines to the source.",
         ),
         Picture("fall", figure_fall(fields), "The largest log v at each distance from its source."),
     )
     numbers = {
         "median_slope": over,
-        "slope_from_finger": slopes[0],
-        "slope_from_palm": slopes[1],
+        "slope": {"from finger": slopes[0], "from palm": slopes[1]},
         "finger_width": width,
         "slope_times_width_over_pi": slopes[0] * width / np.pi,
         "least_log": fields.log[0].min(),
@@ -72,17 +70,17 @@ def fall_claims(over: dict[str, float], slopes: list[float], width: float) -> tu
         judged(
             "The field of a point on a finger falls sharply over the fingers, much less over the palm (2.3).",
             "sharp against much less steep",
-            f"median |∇ log v| {over['fingers']:.2f} per pixel in the fingers, {over['palm']:.2f} in the palm",
+            f"median |∇ log v| {over['fingers']:.2f} a pixel in fingers, {over['palm']:.2f} in the palm",
             over["fingers"] > 2 * over["palm"],
-            note="Fingers are less than half as wide as would make the fall twice as steep.",
+            note="The palm is less than twice as wide as a finger.",
         ),
         judged(
             "From a point at the side of the palm the slope of fall is much less steep (2.3).",
             "much less steep",
-            f"log v falls by {slopes[0]:.2f} per pixel from the tip of the little finger, by {slopes[1]:.2f} from "
-            "the palm's side",
+            f"log v falls by {slopes[0]:.2f} per pixel from the tip of the little finger, by "
+            f"{slopes[1]:.2f} from the palm's side",
             slopes[0] > 2 * slopes[1],
-            note="Near a point source the field falls with the distance itself, wherever it stands.",
+            note="Near a point the field falls with the distance from it, wherever it stands.",
         ),
         judged(
             "The field of a single source decays exponentially (2.3).",
@@ -98,9 +96,9 @@ def envelope(fields: SourceFields, source: int) -> tuple[NDArray[np.float64], ND
     """Return the largest log v at each distance from a source, in steps of a pixel."""
     points, start = fields.sources.system.shape.points, fields.sources.position[source]
     step = np.linalg.norm(points - start, axis=1).astype(int)
-    top = np.full(step.max() + 1, -np.inf)
+    top = np.full(int(step.max()) + 1, -np.inf)
     np.maximum.at(top, step, fields.log[source])
-    return np.arange(top.size) + 0.5, top
+    return np.arange(0.5, top.size), top
 
 
 def slope(fields: SourceFields, source: int) -> float:
@@ -110,21 +108,9 @@ def slope(fields: SourceFields, source: int) -> float:
     return float(-np.polyfit(away[near], top[near], 1)[0])
 
 
-def limb_window(limbs: Limbs, limb: int) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the box around a limb, as high over wide as the whole shape."""
-    points = limbs.shape.points
-    low, high = points[limbs.inside[limb]].min(axis=0) - 2, points[limbs.inside[limb]].max(axis=0) + 2
-    whole = np.ptp(points, axis=0)
-    half = whole * np.max((high - low) / whole) / 2
-    middle = np.clip((low + high) / 2, points.min(axis=0) + half, points.max(axis=0) - half)
-    (top, left), (bottom, right) = middle - half, middle + half
-    return (float(top), float(bottom)), (float(left), float(right))
-
-
 def figure_fall(fields: SourceFields) -> Figure:
     """Draw the fall of both sources."""
-    figure = new_figure(4.0, 2.8)
-    ax = figure.add_subplot()
+    ax = (figure := new_figure(4.0, 2.8)).add_subplot()
     for source, name in enumerate(("tip of the little finger", "side of the palm")):
         ax.plot(*envelope(fields, source), color=COLOURS[source], label=name)
     ax.axvspan(*RANGE, color="#eef1f4", zorder=0)

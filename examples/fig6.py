@@ -3,12 +3,13 @@ Figure 6: the hyperfield
 ========================
 
 Everything together is a stack of N × m fields, one for each screening length ρ and each point p of the
-boundary (2.4). Three layers of sources of variability lie on each other: ρ, the bias of the walk; the level s
-of v, which embeds a smoother and smoother shape; and the boundary point that the value comes from. Left: the
-fields of five ρ. Right: for one of them, the fields of four pieces of the boundary. The slices are computed.
+boundary (2.4). Three layers of sources of variability lie on each other: ρ, the bias of the walk; the level
+s of v, which embeds a smoother and smoother shape; and the boundary point that the value comes from. Left:
+the fields of five ρ. Right: for one of them, the fields of four pieces of the boundary. The slices are
+computed.
 
-For every ρ the fields of all boundary points add up to the field of the whole boundary. They are solved
-for one by one, as logarithms; the sum is held against one solution for all of the boundary at once.
+For every ρ the fields of all boundary points add up to the field of the whole boundary. They are solved for
+one by one, as logarithms; the sum is held against one solution for all of the boundary at once.
 """
 
 import numpy as np
@@ -35,7 +36,7 @@ def make(data: Data) -> Finding:
     hand = found.shapes[0]
     error, largest, points = {}, {}, {}
     for boundary in ("surface", "voxel"):
-        hyperfield = spem.SourceHyperfield(spem.sources(hand, boundary=boundary), RHO)
+        hyperfield = spem.SourceHyperfield(spem.sources(hand, boundary=boundary), np.array(RHO))
         whole = spem.field(hand, RHO, boundary=boundary, solver=spem.Direct())
         error[boundary] = np.abs(hyperfield.total() - whole.T).max(axis=1)
         points[boundary] = hyperfield.size[1]

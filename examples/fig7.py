@@ -4,10 +4,11 @@ Figure 7: non-negative measurements
 
 Parts are found in the logarithms of the fields of single boundary points, for the Laplace equation, ρ = ∞.
 At each node the mean over all points is taken off (4.1), the same as dividing the fields by their geometric
-mean (4.2), and what is negative is set to zero. What is left of the field of one point, here on the tip of the
-little finger as in Figure 5, is where this point matters more than the others do.
+mean (4.2), and what is negative is set to zero. What is left of the field of one point, here on the tip of
+the little finger as in Figure 5, is where this point matters more than the others do.
 
-The median in place of the mean makes half of all values positive at every node; the two pictures hardly differ.
+The median in place of the mean makes half of all values positive at every node; the two pictures hardly
+differ.
 """
 
 import numpy as np
@@ -60,8 +61,8 @@ def make(data: Data) -> Finding:
 def claim_equal(difference: float, mean: float) -> Claim:
     """Judge the two ways of writing the normalisation."""
     return judged(
-        "Taking off the mean of the logarithms is dividing by the geometric mean of the fields, and leaves zero "
-        "mean at each node (4.1, 4.2).",
+        "Taking off the mean of the logarithms is dividing by the geometric mean of the fields, and leaves "
+        "zero mean at each node (4.1, 4.2).",
         "equal",
         f"the two differ by at most {difference:.0e}; the largest mean is {mean:.0e}",
         difference < ROUNDING and mean < ROUNDING,
@@ -73,15 +74,15 @@ def claim_ignored(y: NDArray[np.float64], away: NDArray[np.float64]) -> Claim:
     """Judge which region has no measurement."""
     zeros, others = float(away[y == 0].mean()), float(away[y > 0].mean())
     return judged(
-        "Setting to zero what is below the mean ignores a region within a certain proximity to the boundary node "
-        "of interest (4.1).",
+        "Setting to zero what is below the mean ignores a region within a certain proximity to the "
+        "boundary node of interest (4.1).",
         "what is ignored is near",
         f"{100 * np.mean(y == 0):.0f} % of the nodes have zero; their mean distance from the source is "
-        f"{zeros:.0f} pixels, that of the others {others:.0f}; the largest value is {away[y.argmax()]:.0f} pixel "
-        "away",
+        f"{zeros:.0f} pixels, that of the others {others:.0f}; the largest value is {away[y.argmax()]:.0f} "
+        "pixel away",
         zeros < others,
-        note="By (4.1) values near the source are the largest and stay; what is ignored lies beyond a certain "
-        "proximity. The sentence fits the picture with 'outside' in place of 'within'.",
+        note="By (4.1) values near the source are the largest and stay; what is ignored lies beyond a "
+        "certain proximity. The sentence fits the picture with 'outside' in place of 'within'.",
     )
 
 
@@ -91,8 +92,8 @@ def claim_parts(y: NDArray[np.float64], limbs: Limbs) -> Claim:
     return judged(
         "What remains allows distinction of prominent parts (4.1).",
         "distinguishes prominent parts",
-        f"of the source on the little finger, {100 * share[LITTLE]:.0f} % of this finger's nodes have a positive "
-        f"measurement, of any other finger's at most {100 * max(share[1:]):.0f} %",
+        f"of the source on the little finger, {100 * share[LITTLE]:.0f} % of this finger's nodes have a "
+        f"positive measurement, of any other finger's at most {100 * max(share[1:]):.0f} %",
         share[LITTLE] > 0.5 and max(share[1:]) < 0.05,
         note="The measurement does not keep to the finger that its source is on.",
     )

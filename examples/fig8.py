@@ -2,48 +2,49 @@
 Figure 8: parts of a hand
 =========================
 
-Arrange the measurements of Figure 7 in a matrix Y, a column for each node, and factor it, Y ≈ A S with A and S
-not negative and S sparse (4.3). The rows of S are components in the region, one in each panel; the columns of A
-are the same on the boundary, drawn along the outline. No one has said what a finger is.
+Arrange the measurements of Figure 7 in a matrix Y, a column for each node, and factor it, Y ≈ A S with A
+and S not negative and S sparse (4.3). The rows of S are components in the region, one in each panel; the
+columns of A are the same on the boundary, drawn along the outline. No one has said what a finger is.
 
-The paper shows two settings: a strong penalty λ and few components, five in the caption and six in the text;
-and a weak penalty and twelve. The fingers remain, and more components stand for their roots and pieces of the
-palm. Fingers are checked against what an opening of the silhouette takes away, which knows nothing of fields.
+The paper shows two settings: a strong penalty λ and few components, five in the caption and six in the
+text; and a weak penalty and twelve. The fingers remain, and more components stand for their roots and
+pieces of the palm. Fingers are checked against what an opening of the silhouette takes away, which knows
+nothing of fields.
 """
+
+from typing import Any
 
 import numpy as np
 
 import spem
 from spem.decomposition.division import region_parts
 from spem.decomposition.parts import Parts
-from spem.paper.data import Data
+from spem.paper.data import INNER_RADIUS, Data
 from spem.paper.findings import Claim, Finding, Picture, Table, judged
-from spem.paper.limbs import Limbs, fingers, main_labels
+from spem.paper.limbs import core_labels, fingers, main_labels
 from spem.paper.present import present
-from spem.paper.silhouettes import chosen
+from spem.paper.silhouettes import SMALL, chosen
 from spem.plots.part_components import figure_components
 
 # The paper gives no λ; these are shares of the λ at which all codes vanish.
 STRONG, WEAK = 0.3, 0.02
 SETTINGS = {"k5": (5, STRONG), "k6": (6, STRONG), "k12": (12, WEAK)}
 PALM_PIECES = 3
+FINGERS = ("little", "ring", "middle", "index", "thumb")
 
 
 def make(data: Data) -> Finding:
     """Divide a hand three times, and find the fingers among the parts."""
-    found = chosen(data, "hand")
+    found = chosen(data, "hand", inner_radius=SMALL if data.quick else INNER_RADIUS)
     hand = found.shapes[0]
     limbs = fingers(hand)
     fields = spem.source_fields(spem.sources(hand, boundary="voxel"))
-    starts = 2 if data.quick else 8
-    parts = {
-        name: region_parts(fields, k, sparsity=share, n_init=starts) for name, (k, share) in SETTINGS.items()
-    }
+    parts = {name: region_parts(fields, k, sparsity=share) for name, (k, share) in SETTINGS.items()}
     own = {name: main_labels(several.node_labels, limbs.inside) for name, several in parts.items()}
-    palm = {name: palm_parts(several, limbs) for name, several in parts.items()}
-    numbers = {
+    palm = {name: core_labels(several.node_labels, limbs) for name, several in parts.items()}
+    numbers: dict[str, Any] = {
         "finger_parts": own,
-        "own": {name: len(set(labels) - set(palm[name])) for name, labels in own.items()},
+        "own": {name: len(set(labels) - {-1, *palm[name]}) for name, labels in own.items()},
         "in_palm": palm,
         "overlap": [
             overlap(parts["k6"], a, parts["k12"], b) for a, b in zip(own["k6"], own["k12"], strict=True)
@@ -59,9 +60,7 @@ def make(data: Data) -> Finding:
     )
     rows = tuple(
         (finger, f"{100 * both:.0f} %", f"{100 * within:.0f} %")
-        for finger, (both, within) in zip(
-            ("little", "ring", "middle", "index", "thumb"), numbers["overlap"], strict=True
-        )
+        for finger, (both, within) in zip(FINGERS, numbers["overlap"], strict=True)
     )
     head = ("finger", "shared by both, of either", "of the later, within the earlier")
     caption = "Nodes of each finger's component among six and among twelve."
@@ -70,7 +69,7 @@ def make(data: Data) -> Finding:
     )
 
 
-def part_claims(numbers: dict[str, object]) -> tuple[Claim, ...]:
+def part_claims(numbers: dict[str, Any]) -> tuple[Claim, ...]:
     """Judge separation, preservation and what the further components are."""
     own, palm = numbers["own"], numbers["in_palm"]
     within = float(np.mean([later for _, later in numbers["overlap"]]))
@@ -88,15 +87,16 @@ def part_claims(numbers: dict[str, object]) -> tuple[Claim, ...]:
             "Five components do as well (caption of Figure 8a).",
             "k = 5",
             f"{own['k5']} fingers have a component of their own, {len(palm['k5'])} lies in the palm",
-            own["k5"] == 5,
-            note="Five fingers and a palm are six parts: with k = 5 one finger goes with the palm. The text's six "
-            "is the number that gives the picture described.",
+            own["k5"] == 5 and len(palm["k5"]) == 1,
+            note="Five fingers and a palm are six parts, as the text says: with five, one of them is "
+            "missing.",
         ),
         judged(
             "With twelve components and a low λ, those of the fingers are preserved (4.1).",
             "preserved",
-            f"{own['k12']} fingers still have a component of their own, {100 * within:.0f} % of it within that of "
-            f"six; shared by both, of either: {100 * both:.0f} %, since the roots have become components",
+            f"{own['k12']} fingers still have a component of their own, {100 * within:.0f} % of it within "
+            f"that of six; shared by both, of either: {100 * both:.0f} %, since the roots have become "
+            "components",
             own["k12"] == 5 and within > 0.5,
             note="Fingers are divided further.",
         ),
@@ -105,15 +105,10 @@ def part_claims(numbers: dict[str, object]) -> tuple[Claim, ...]:
             f"{PALM_PIECES} parts of the palm, others at roots",
             f"{len(palm['k12'])} components lie in the palm, {extra} more in fingers, at their roots",
             len(palm["k12"]) == PALM_PIECES and extra > 0,
-            note="Not all fingers have a root of their own among twelve; the palm takes what they leave. Which it "
-            "is depends on the hand.",
+            note="Not all fingers have a root of their own among twelve; the palm takes what they leave. "
+            "Which it is depends on the hand.",
         ),
     )
-
-
-def palm_parts(parts: Parts, limbs: Limbs) -> list[int]:
-    """Return the parts most of whose nodes lie in no finger."""
-    return [j for j in range(parts.n_parts) if np.mean(limbs.core[parts.node_labels == j]) > 0.5]
 
 
 def overlap(earlier: Parts, a: int, later: Parts, b: int) -> tuple[float, float]:

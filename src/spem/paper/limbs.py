@@ -6,16 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from spem.errors import ParameterError
 from spem.fields.boundary.sources import Sources, point_sources
 from spem.fields.operator import assemble
 from spem.paper.perturbations import limbs
-from spem.shapes.distance import signed_distance
 from spem.shapes.shape import Shape
 
 # Fingers of a hand; legs and tail of an animal.
 CHAIN = 5
+# Between points of an outline that distances are measured from, in voxels.
+STEP = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +59,17 @@ class Limbs:
         axis = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
         return float(np.ptp(points @ axis) + max(self.shape.spacing))
 
+    def window(self, limb: int) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return the ends, along each axis, of a box around a limb that is as high over wide as the shape."""
+        points, room = self.shape.points, 2 * np.asarray(self.shape.spacing)
+        mine = points[self.inside[limb]]
+        low, high = mine.min(axis=0) - room, mine.max(axis=0) + room
+        least, most = points.min(axis=0) - room / 4, points.max(axis=0) + room / 4
+        half = (most - least) * np.max((high - low) / (most - least)) / 2
+        middle = np.clip((low + high) / 2, least + half, most - half)
+        (top, left), (bottom, right) = (middle - half).tolist(), (middle + half).tolist()
+        return (top, bottom), (left, right)
+
     def touched(self, sources: Sources) -> NDArray[np.bool_]:
         """Return ``(n_limbs, n_sources)`` True for the sources beside the nodes of each limb."""
         node, _ = sources.system.domain.boundary_edges
@@ -82,6 +95,12 @@ def main_labels(labels: NDArray[np.integer], members: NDArray[np.bool_]) -> list
     [0, 2]
     """
     return [int(np.bincount(labels[limb] + 1).argmax()) - 1 for limb in members]
+
+
+def core_labels(labels: NDArray[np.integer], limbs: Limbs) -> list[int]:
+    """Return the labels of nodes that lie for the most part in no limb."""
+    found = np.unique(labels[labels >= 0])
+    return [int(label) for label in found if np.mean(limbs.core[labels == label]) > 0.5]
 
 
 def find_limbs(shape: Shape) -> Limbs:
@@ -132,14 +151,22 @@ def legs_and_tail(shape: Shape) -> Limbs:
 
 
 def node_depth(shape: Shape) -> NDArray[np.float64]:
-    """Return the distance of each node to the boundary, finer than a voxel.
+    """Return the distance of each node of a silhouette to its outline, drawn from cut to cut.
 
     Examples
     --------
-    >>> node_depth(Shape.from_mask(np.ones(3)))
-    array([0.5, 1.5, 0.5])
+    >>> node_depth(Shape.from_mask(np.ones((3, 9)))).reshape(3, 9)[:, 4].round(2).tolist()
+    [0.5, 1.5, 0.5]
     """
-    return np.asarray(signed_distance(shape)[shape.mask])
+    points = point_sources(assemble(shape, "surface"))
+    pieces = []
+    for contour in np.unique(points.contour):
+        line = points.position[points.contour == contour]
+        line = np.vstack([line, line[:1]])
+        way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+        at = np.arange(0.0, way[-1], STEP * min(shape.spacing))
+        pieces.append(np.column_stack([np.interp(at, way, column) for column in line.T]))
+    return np.asarray(KDTree(np.vstack(pieces)).query(shape.points)[0])
 
 
 def _chain(found: Limbs, rank: NDArray[np.floating | np.integer]) -> Limbs:

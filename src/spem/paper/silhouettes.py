@@ -11,6 +11,9 @@ from spem.paper.data import INNER_RADIUS, Data, Shapes, Silhouette
 REAL: dict[Silhouette, tuple[int, ...]] = {"hand": (11,), "cat": (1, 2, 3), "human": (6,)}
 MADE: dict[Silhouette, tuple[int, ...]] = {"hand": (2,), "cat": (1, 2, 5), "human": (1,)}
 
+# Inner radius in a quick run of what takes long, in pixels.
+SMALL = 10.0
+
 
 def chosen(
     data: Data,

@@ -1,0 +1,27 @@
+"""Spread of a field at one depth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spem.paper.equidistance import BAND, spread_along_curve, spread_ratios
+from spem.paper.limbs import node_depth
+from spem.shapes.synthetic import disk
+
+
+def test_a_field_of_the_depth_alone_has_ratio_one():
+    """Its spread is what the band's width explains, or less where this is taken for wider than it is."""
+    shape = disk(20.0, 1.0)
+    fields = (3 * node_depth(shape))[:, None]
+    found = spread_ratios(shape, fields, 6.0)
+    assert 0.5 < found["sub-voxel"][0] < 1.0001
+    assert spread_along_curve(shape, fields, 6.0)[0] < 1e-12
+
+
+def test_a_field_of_something_else_has_a_large_ratio():
+    """Here of the angle."""
+    shape = disk(20.0, 1.0)
+    other = np.arctan2(*shape.points.T)
+    fields = (0.01 * node_depth(shape) + other)[:, None]
+    assert spread_ratios(shape, fields, 6.0)["sub-voxel"][0] > 50
+    assert spread_along_curve(shape, fields, 6.0)[0] > BAND
