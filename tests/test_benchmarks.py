@@ -15,6 +15,7 @@ FOLDER = Path(__file__).parents[1] / "benchmarks"
 KEYS = {"benchmark", "quick", "machine", "facts", "tables", "targets", "skipped"}
 WITHOUT_DATA = (
     "convergence",
+    "geodesics",
     "parts_silhouettes",
     "patches",
     "source_accuracy",

@@ -23,8 +23,8 @@ def distance_to_boundary(shape: Shape) -> NDArray[np.float64]:
     """Return the Euclidean distance from the nodes to the surface, as the cuts have it.
 
     Through each cut goes a plane, fitted to the cuts around it. A node's distance is that to the plane of
-    its nearest cut; or to the cut, where cuts lie round an edge or the plane is met farther off. Second order where
-    the surface is smooth.
+    its nearest cut; or to the cut, where cuts lie round an edge or the plane is met farther off. Second
+    order where the surface is smooth.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def _beside(cuts: NDArray[np.float64], outward: NDArray[np.float64], step: float
 def _planes(
     cuts: NDArray[np.float64], outward: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fit planes to groups of cuts ``(n, k, d)``: unit outward normals, and root mean squares off the planes."""
+    """Fit planes to groups of cuts ``(n, k, d)``: unit outward normals, and root mean squares off them."""
     about_mean = cuts - cuts.mean(axis=1, keepdims=True)
     values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", about_mean, about_mean))
     normal = vectors[:, :, 0]

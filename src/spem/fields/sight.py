@@ -6,6 +6,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+# Beyond every crossing: an axis along which a line does not run.
+_NEVER = np.iinfo(np.int64).max
+
 
 @njit(cache=True, nogil=True)
 def see(
@@ -39,7 +42,7 @@ def see(
     n, d = index.shape
     tried = np.zeros(n, np.bool_)
     queue = np.empty(n, np.int32)
-    corner = np.empty(1 << d, np.int32)
+    crossing, corner = np.empty((d, 3), np.int64), np.empty(1 << d, np.int32)
     queue[0], tried[seed] = seed, True
     first, last = 0, 1
     while first < last:
@@ -53,7 +56,7 @@ def see(
             near = neighbours[node, k]
             if near < n and not tried[near]:
                 tried[near] = True
-                if _in_sight(index, neighbours, seed, near, corner):
+                if _in_sight(index, neighbours, seed, near, crossing, corner):
                     queue[last] = near
                     last += 1
 
@@ -64,40 +67,57 @@ def _in_sight(
     neighbours: NDArray[np.int32],
     start: int,
     end: int,
+    crossing: NDArray[np.int64],
     corner: NDArray[np.int32],
 ) -> bool:
     """Walk the voxels on the straight line from node to node; False where a face is no uncut edge."""
-    d, n = index.shape[1], index.shape[0]
-    length = np.abs(index[end] - index[start])
-    crossed = np.zeros(d, np.int64)
+    n, d = index.shape
+    # the k-th face across axis a is crossed at (2 k + 1) / (2 |steps_a|): whole numbers after scaling
+    scale = 1
+    for a in range(d):
+        scale *= max(abs(index[end, a] - index[start, a]), 1)
+    for a in range(d):
+        steps = abs(index[end, a] - index[start, a])
+        crossing[a, 0] = scale // steps if steps else _NEVER
+        crossing[a, 1] = 2 * crossing[a, 0] if steps else 0
+        crossing[a, 2] = 2 * a + int(index[end, a] > index[start, a])
     node = start
-    for _ in range(length.sum()):
-        # axis a is crossed next at (2 crossed + 1) / (2 length); equal ones at a corner of voxels, at once
-        ties, lead = 0, -1
-        for a in range(d):
-            if crossed[a] == length[a]:
-                continue
-            order = 1
-            if lead >= 0:
-                order = (2 * crossed[lead] + 1) * length[a] - (2 * crossed[a] + 1) * length[lead]
-            if order > 0:
-                ties, lead = 1 << a, a
-            elif order == 0:
+    while node != end:
+        lead, ties = 0, 1
+        for a in range(1, d):
+            if crossing[a, 0] < crossing[lead, 0]:
+                lead, ties = a, 1 << a
+            elif crossing[a, 0] == crossing[lead, 0]:
                 ties |= 1 << a
-        corner[0] = node
-        for part in range(1, ties + 1):
-            if part & ties != part:
-                continue
-            corner[part] = n
-            for a in range(d):
-                if part >> a & 1 and corner[part ^ (1 << a)] < n and corner[part] == n:
-                    way = 2 * a + int(index[end, a] > index[start, a])
-                    corner[part] = neighbours[corner[part ^ (1 << a)], way]
-        node = corner[ties]
+        if ties == 1 << lead:
+            node = neighbours[node, crossing[lead, 2]]
+            crossing[lead, 0] += crossing[lead, 1]
+        else:
+            node = _round_corner(neighbours, node, ties, crossing, corner)
         if node == n:
             return False
-        for a in range(d):
-            crossed[a] += ties >> a & 1
-        if node == end:
-            return True
     return True
+
+
+@njit(cache=True, nogil=True)
+def _round_corner(
+    neighbours: NDArray[np.int32],
+    node: int,
+    ties: int,
+    crossing: NDArray[np.int64],
+    corner: NDArray[np.int32],
+) -> int:
+    """Cross several faces at once, where they meet: on any way along edges; the number of nodes if none."""
+    n, d = neighbours.shape[0], crossing.shape[0]
+    corner[0] = node
+    for part in range(1, ties + 1):
+        if part & ties != part:
+            continue
+        corner[part] = n
+        for a in range(d):
+            if part >> a & 1 and corner[part] == n and corner[part ^ (1 << a)] < n:
+                corner[part] = neighbours[corner[part ^ (1 << a)], crossing[a, 2]]
+    for a in range(d):
+        if ties >> a & 1:
+            crossing[a, 0] += crossing[a, 1]
+    return int(corner[ties])
