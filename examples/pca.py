@@ -39,13 +39,13 @@ RIVALS = (
     (
         "Locally linear embedding leads to fewer features and less consistency (4.2).",
         ("LLE, 12 neighbours", "LLE, 60 neighbours"),
-        "With few neighbours it does; with many it smooths, and is as consistent as PCA or more so.",
+        "With few neighbours it does; with many it averages more, and comes up to PCA.",
     ),
     (
         "Diffusion maps overlearn the ρ-space: fewer features and less consistency (4.2).",
         ("diffusion maps, ε", "diffusion maps, ε/1000"),
         "They fall apart where the kernel is so narrow that it follows the single rows. A wide kernel makes "
-        "them smooth functions of the rows, and more consistent than PCA from the fourth component on.",
+        "them smooth functions of the rows, as consistent as PCA.",
     ),
     (
         "Linear PCA outperforms probabilistic PCA solved by maximum likelihood (4.2).",

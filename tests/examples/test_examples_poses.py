@@ -15,5 +15,5 @@ def test_pca_is_more_consistent_than_ica_and_probabilistic_pca():
     own = {method: told["mean"]["own order"] for method, told in human.items()}
     assert own["PCA (SPEM)"] > 0.95
     assert own["PCA (SPEM)"] > own["ICA, own starts"] + 0.2
-    assert own["PCA (SPEM)"] > own["probabilistic PCA, own starts"] + 0.1
-    assert human["probabilistic PCA"]["mean"]["any mixture"] > 0.95
+    assert own["PCA (SPEM)"] > own["probabilistic PCA, own starts"] + 0.2
+    assert human["probabilistic PCA"]["mean"]["any mixture"] > 0.9

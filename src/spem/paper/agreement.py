@@ -82,6 +82,55 @@ def correlations(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.f
     return np.abs(_unit(a).T @ _unit(b))
 
 
+def own_partners(values: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return how often the component most like the k-th of one pose is the k-th of another.
+
+    Parameters
+    ----------
+    values
+        ``(n_points, n_components)`` of each pose, at corresponding points.
+
+    Returns
+    -------
+    shares
+        ``(n_components,)`` share of the ordered pairs of poses.
+
+    Examples
+    --------
+    >>> one = np.random.default_rng(0).normal(size=(50, 3))
+    >>> own_partners([one, one[:, [0, 2, 1]]]).tolist()
+    [1.0, 0.0, 0.0]
+    """
+    n = values[0].shape[1]
+    tables = [correlations(a, b) for a, b in itertools.permutations(values, 2)]
+    return np.asarray(np.mean([table.argmax(axis=1) == np.arange(n) for table in tables], axis=0))
+
+
+def beyond(values: NDArray[np.float64], depth: NDArray[np.float64], n_bins: int = 20) -> NDArray[np.float64]:
+    """Return what of components the depth of a point does not tell: less their mean at about its depth.
+
+    Parameters
+    ----------
+    values
+        ``(n_points, n_components)``.
+    depth
+        ``(n_points,)`` distance to the boundary.
+    n_bins
+        Number of classes of depth, with as many points in each.
+
+    Examples
+    --------
+    >>> depth = np.repeat([1.0, 2.0], 10)
+    >>> beyond(depth[:, None] ** 2, depth, 2).max()
+    np.float64(0.0)
+    """
+    rank = np.argsort(np.argsort(depth, kind="stable"), kind="stable")
+    number = rank * n_bins // depth.size
+    count = np.bincount(number, minlength=n_bins)
+    means = np.stack([np.bincount(number, column, n_bins) / count for column in values.T], axis=1)
+    return np.asarray(values - means[number])
+
+
 def _unit(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Centred columns of unit length; constant ones are zero."""
     centred = values - values.mean(axis=0)

@@ -16,6 +16,7 @@ from spem.fields.hyperfield import Hyperfield
 from spem.paper.data import Data
 from spem.plots.extension import extend_values
 from spem.plots.level import surface_level
+from spem.shapes.distance import signed_distance
 from spem.shapes.landmarks import creature_poses
 from spem.shapes.read import read
 from spem.shapes.shape import Shape
@@ -27,6 +28,8 @@ _MESHES = {
 }
 COLLECTIONS = tuple(_MESHES)
 VOXELS, QUICK_VOXELS, QUICK_POSES = 15_000, 1_500, 3
+FINER = 1.4
+_SEED = 0
 # Vertices whose motion carries a point, and the power of their distance that weighs them less and less.
 _AROUND, _POWER = 300, 4
 
@@ -45,6 +48,8 @@ class Poses:
         One sentence for the page.
     shapes
         A shape each.
+    finer
+        The first pose again, on a grid of `FINER` times as many voxels.
     inside
         ``(n_poses, n_inside, d)`` corresponding points spread over the volume.
     marks
@@ -57,6 +62,7 @@ class Poses:
     collection: str
     source: str
     shapes: tuple[Shape, ...]
+    finer: Shape
     inside: NDArray[np.float64]
     marks: NDArray[np.float64]
     mirror: NDArray[np.int64]
@@ -103,6 +109,18 @@ def fields_at(field: Hyperfield, points: NDArray[np.float64]) -> NDArray[np.floa
     return np.asarray(coefficients[0] + at @ coefficients[1:])
 
 
+def depth_at(shape: Shape, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance of points of a shape to its surface.
+
+    Examples
+    --------
+    >>> depth_at(Shape.from_mask([1, 1, 1]), np.array([[0.0], [1.0]])).tolist()
+    [0.5, 1.5]
+    """
+    index = ((points - np.asarray(shape.origin)) / np.asarray(shape.spacing)).T
+    return np.asarray(map_coordinates(signed_distance(shape), index, order=1, mode="nearest"))
+
+
 def load_poses(data: Data, *, n_inside: int = 1500, n_marks: int = 400) -> list[Poses]:
     """Return the sets of poses that are there, or one creature where there is none.
 
@@ -119,7 +137,7 @@ def load_poses(data: Data, *, n_inside: int = 1500, n_marks: int = 400) -> list[
     >>> poses.name, len(poses.shapes), poses.nodes.shape
     ('human', 3, (3, 20))
     """
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(_SEED)
     found = [
         _mesh_poses(name, folder, data.quick, n_inside, n_marks, rng)
         for name in COLLECTIONS
@@ -187,16 +205,24 @@ def _mesh_poses(
     side = rng.choice(len(area), n_marks // 2, replace=False, p=area / area.sum())
     chosen = np.concatenate([side, _mirror_images(vertices[0])[side]])
     half = np.arange(n_marks // 2)
-    inside = shapes[0].points[rng.choice(shapes[0].n_nodes, n_inside, replace=False)]
+    inside = _spread(shapes[0], n_inside, rng)
     return Poses(
         f"{name}s",
         collection,
         f"{len(files)} poses of one {name}, whose vertices correspond, at {voxels} voxels each.",
         shapes,
+        read(files[0], voxels=round(FINER * voxels)),
         np.stack([inside, *(carried(inside, vertices[0], moved, area) for moved in vertices[1:])]),
         np.stack([_below(s, v, faces, chosen) for s, v in zip(shapes, vertices, strict=True)]),
         np.concatenate([half + half.size, half]),
     )
+
+
+def _spread(shape: Shape, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Draw points evenly from the volume: off the nodes, so that all poses are interpolated alike."""
+    nodes = rng.choice(shape.n_nodes, 2 * count)
+    points = shape.points[nodes] + rng.uniform(-0.5, 0.5, (2 * count, shape.ndim)) * shape.spacing
+    return points[depth_at(shape, points) > 0][:count]
 
 
 def _below(
@@ -211,6 +237,8 @@ def _creature(quick: bool, n_points: int, n_marks: int, rng: np.random.Generator
     """Pose a creature: the silhouette of a human, or its body in space."""
     ndim, voxels, count = (2, QUICK_VOXELS, QUICK_POSES) if quick else (3, VOXELS, 5)
     made = creature_poses("human", count, ndim=ndim, voxels=voxels, n_points=n_points, rng=rng)
+    again = np.random.default_rng(_SEED)
+    finer = creature_poses("human", 1, ndim=ndim, voxels=round(FINER * voxels), n_points=2, rng=again)
     half = n_marks // 2
     pairs = np.concatenate([np.arange(half), made.mirror[:half]])
     return Poses(
@@ -218,6 +246,7 @@ def _creature(quick: bool, n_points: int, n_marks: int, rng: np.random.Generator
         "",
         f"{count} poses of a creature made here, whose points move with its bones.",
         made.shapes,
+        finer.shapes[0],
         made.points,
         made.points[:, pairs],
         np.concatenate([np.arange(half) + half, np.arange(half)]),
