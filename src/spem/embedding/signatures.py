@@ -167,8 +167,7 @@ def shared_values(size: float, ndim: int, n_pairs: int, count: int) -> Array:
     """Return energies that shapes of a collection have in common, by their size alone.
 
     They run from 1/L² to half of Weyl's estimate 4π² (n/ω_d)^(2/d) / L² of the n-th eigenvalue, ω_d being the
-    volume of the unit ball: near it lie the values of solids, those of plane shapes above. 4 ln 10 divided
-    by them are times in common.
+    volume of the unit ball: near it lie the values of solids, those of plane shapes above.
 
     Parameters
     ----------
@@ -197,14 +196,30 @@ def shared_values(size: float, ndim: int, n_pairs: int, count: int) -> Array:
 
 
 def shared_times(size: float, ndim: int, n_pairs: int, count: int) -> Array:
-    """Return times that shapes of a collection have in common: 4 ln 10 over `shared_values`, ascending.
+    """Return times that shapes of a collection have in common, by their size alone.
+
+    They are ln 10 over `shared_values`: at each, heat of that value has fallen to a tenth. The shortest are
+    shorter than those of a single shape by default: pairs that are left out would still count there, but they
+    are left out of all shapes alike, and codes tell shapes apart better.
+
+    Parameters
+    ----------
+    size, ndim, n_pairs
+        As `shared_values` has them.
+    count
+        How many times.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(count,)`` ascending, in length².
 
     Examples
     --------
     >>> shared_times(1.0, 2, 100, 3).round(3).tolist()
-    [0.015, 0.367, 9.21]
+    [0.004, 0.092, 2.303]
     """
-    return _SPENT / shared_values(size, ndim, n_pairs, count)[::-1]
+    return math.log(10) / shared_values(size, ndim, n_pairs, count)[::-1]
 
 
 def _above_zero(spectrum: Spectrum) -> NDArray[np.bool_]:
