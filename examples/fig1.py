@@ -27,7 +27,7 @@ from spem.plots.figures import figure_fields
 from spem.plots.style import COLOURS, DASHES, MUTED, framed, new_figure
 
 RHO = (2.0, 4.0, 8.0, 16.0, 32.0)
-# What is below this share counts as nothing; what is above half of what ρ = ∞ has counts as all.
+# Below this share is nothing; above half of what ρ = ∞ has is most.
 LITTLE, MOST = 0.05, 0.5
 
 
@@ -91,11 +91,8 @@ def far_shares(sources: spem.Sources, several: tuple[float, ...]) -> list[float]
     """Return the mean share in v of boundary points much farther away than the nearest, for each ρ."""
     away = cdist(sources.position, sources.system.shape.points)
     far = away > away.min(axis=0) + INNER_RADIUS
-    shares = []
-    for rho in several:
-        values = spem.source_fields(sources, rho).values
-        shares.append(float(np.mean((values * far).sum(axis=0) / values.sum(axis=0))))
-    return shares
+    slices = (spem.source_fields(sources, rho).values for rho in several)
+    return [float(np.mean((values * far).sum(axis=0) / values.sum(axis=0))) for values in slices]
 
 
 def figure_reach(depth: NDArray[np.float64], fields: NDArray[np.float64], far: list[float]) -> Figure:

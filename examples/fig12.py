@@ -12,6 +12,7 @@ divided well if each of the five has a segment of its own; a division is consist
 number.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -45,25 +46,11 @@ def make(data: Data) -> Finding:
     alone, matched, together = (
         [Segments.of(parts) for parts in several] for several in (apart, three, joint)
     )
+    kept = [parts.without_weak(WEAK) for parts in joint]
     pictures = (
-        Picture("apart", figure_parts(three), "Each pose divided by itself; equal parts matched afterwards."),
-        Picture(
-            "together",
-            figure_parts([parts.without_weak() for parts in joint]),
-            "Poses divided together, without segments of less than a tenth of the mean intensity.",
-        ),
+        Picture("apart", figure_parts(three), "Each pose divided by itself; parts matched afterwards."),
+        Picture("together", figure_parts(kept), "Poses divided together, without weak segments."),
     )
-    head = (
-        "cat",
-        "limbs with a segment of their own",
-        "segments of head and trunk",
-        "divided together: limbs",
-    )
-    rows = tuple(
-        (cat.name, f"{one.own} of {LIMBS}", str(one.on_trunk), " ".join(map(str, all_.labels)))
-        for cat, one, all_ in zip(cats, alone, together, strict=True)
-    )
-    caption = "Boundary segments of each cat, divided by itself; numbers of its limbs, all divided together."
     numbers = {
         "own": [one.own for one in alone],
         "on_trunk": [one.on_trunk for one in alone],
@@ -73,12 +60,20 @@ def make(data: Data) -> Finding:
         "odd": odd_segments(together),
         "weak": [int(np.count_nonzero(one.intensity < WEAK)) for one in together],
     }
-    return Finding(
-        found.source,
-        pose_claims(numbers, len(three)),
-        pictures,
-        tables=(Table(caption, head, rows),),
-        numbers=numbers,
+    claims, table = pose_claims(numbers, len(three)), table_segments(cats, alone, together)
+    return Finding(found.source, claims, pictures, tables=(table,), numbers=numbers)
+
+
+def table_segments(cats: Sequence[spem.Shape], alone: list[Segments], together: list[Segments]) -> Table:
+    """Return what each cat's segments are."""
+    rows = tuple(
+        (cat.name, f"{one.own} of {LIMBS}", str(one.on_trunk), " ".join(map(str, joint.labels)))
+        for cat, one, joint in zip(cats, alone, together, strict=True)
+    )
+    return Table(
+        "Boundary segments of each cat, divided by itself; numbers of its limbs, all divided together.",
+        ("cat", "limbs with a segment of their own", "others", "limbs, divided together"),
+        rows,
     )
 
 

@@ -12,6 +12,7 @@ the deepest one in the middle of the longest finger; and the node of the palm as
 """
 
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,8 +21,9 @@ from numpy.typing import NDArray
 import spem
 from spem.fields.hyperfield import Hyperfield
 from spem.paper.data import Data
-from spem.paper.findings import Finding, Picture, Table, judged
-from spem.paper.limbs import fingers, node_depth
+from spem.paper.equidistance import distinct_nodes
+from spem.paper.findings import Claim, Finding, Picture, Table, judged
+from spem.paper.limbs import node_depth
 from spem.paper.present import present
 from spem.paper.silhouettes import chosen
 from spem.plots.profiles import draw_profiles
@@ -31,43 +33,24 @@ RHO = np.linspace(2, 30, 281)
 NAMES = ("centre", "palm, ⅔ deep", "palm, ⅓ deep", "finger", "palm, as deep as finger")
 FINGER, TWIN = 3, 4
 
+Array = NDArray[np.floating[Any]]
+
 
 def make(data: Data) -> Finding:
     """Draw the profiles of five nodes of a hand, and compare two that are equally deep."""
     found = chosen(data, "hand")
     hand = found.shapes[0]
-    nodes, depth = choose_nodes(hand), node_depth(hand)
+    nodes, depth = distinct_nodes(hand), node_depth(hand)
     hyperfield = spem.sweep(hand, RHO)
     profiles = hyperfield.fields()[nodes]
     apart = {pair: np.abs(profiles[pair[0]] - profiles[pair[1]]) for pair in combinations(range(5), 2)}
     nearest = min(apart, key=lambda pair: float(apart[pair].mean()))
     pair = apart[FINGER, TWIN]
     others = np.array([apart[other, FINGER].mean() for other in range(FINGER)])
-    rho = float(RHO[pair.argmax()])
     # What the little that is left between their distances could bring about at a straight boundary.
-    explained = abs(float(depth[nodes[FINGER]] - depth[nodes[TWIN]])) / RHO * profiles[TWIN]
-    ratio = float(pair.max() / explained[pair.argmax()])
-    deep = f"{depth[nodes[FINGER]]:.2f} and {depth[nodes[TWIN]]:.2f}"
-    claims = (
-        judged(
-            "Two nodes, in a finger and in the palm, that are about equally far from the boundary have "
-            "profiles that are close yet not identical, because the finger is thin (2.2).",
-            "not nearly identical",
-            f"{deep} pixels deep, their profiles differ by up to {pair.max():.2f} (at ρ = {rho:.1f}), "
-            f"{ratio:.0f} times what the difference in distance explains",
-            bool(pair.max() > 0.05 and ratio > 10),
-            note="The profiles differ by no more than their distances.",
-        ),
-        judged(
-            "Of all profiles, those two are the closer ones, for their comparable distance (2.2).",
-            "closer profiles",
-            f"mean difference of the finger's profile from that of its twin {pair.mean():.3f}, from the "
-            f"others at least {others.min():.3f}; of all pairs, {NAMES[nearest[0]]!r} and "
-            f"{NAMES[nearest[1]]!r} are the closest ({apart[nearest].mean():.3f})",
-            bool(pair.mean() < others.min()),
-            note="A thin part changes a profile by more than a difference in distance does.",
-        ),
-    )
+    deep = depth[nodes[[FINGER, TWIN]]]
+    ratio = float(pair.max() / (abs(deep[0] - deep[1]) / RHO * profiles[TWIN])[pair.argmax()])
+    closest = f"{NAMES[nearest[0]]!r} and {NAMES[nearest[1]]!r} are the closest ({apart[nearest].mean():.3f})"
     rows = tuple(
         (name, f"{depth[node]:.2f}", *(f"{profile[np.abs(RHO - r).argmin()]:.3f}" for r in (2, 5, 10, 30)))
         for name, node, profile in zip(NAMES, nodes, profiles, strict=True)
@@ -75,7 +58,7 @@ def make(data: Data) -> Finding:
     head = ("node", "depth (pixels)", "v at ρ = 2", "ρ = 5", "ρ = 10", "ρ = 30")
     return Finding(
         found.source,
-        claims,
+        twin_claims(deep, pair, others, ratio, closest),
         (Picture("profiles", figure_nodes(hyperfield, nodes), "v against ρ at five nodes of a hand."),),
         tables=(Table("Profiles of the five nodes.", head, rows),),
         numbers={
@@ -88,21 +71,33 @@ def make(data: Data) -> Finding:
     )
 
 
-def choose_nodes(hand: spem.Shape) -> NDArray[np.int64]:
-    """Choose five nodes of distinct character; those of the palm as far apart as their depths allow."""
-    found, depth, points = fingers(hand), node_depth(hand), hand.points
-    long = int(np.argmax([found.length(finger) for finger in range(5)]))
-    away = np.linalg.norm(points - points[found.tip(long)], axis=1)
-    middle = found.inside[long] & (np.abs(away - found.length(long) / 2) < 0.15 * found.length(long))
-    finger = int(np.where(middle, depth, 0).argmax())
-    nodes = [int(np.where(found.core, depth, 0).argmax()), 0, 0, finger, 0]
-    limbs = points[~found.core]
-    for place, wanted in ((TWIN, depth[finger]), (1, depth.max() * 2 / 3), (2, depth.max() / 3)):
-        level = np.flatnonzero(found.core & (np.abs(depth - wanted) < 0.1))
-        others = np.vstack([limbs, points[[node for node in nodes if node]]])
-        away = np.linalg.norm(points[level][:, None] - others, axis=2).min(axis=1)
-        nodes[place] = int(level[away.argmax()])
-    return np.array(nodes)
+def twin_claims(
+    deep: NDArray[np.float64],
+    pair: NDArray[np.float64],
+    others: NDArray[np.float64],
+    ratio: float,
+    closest: str,
+) -> tuple[Claim, Claim]:
+    """Judge two profiles of equal depth against each other and against the others."""
+    return (
+        judged(
+            "Two nodes, in a finger and in the palm, that are about equally far from the boundary have "
+            "profiles that are close yet not identical, because the finger is thin (2.2).",
+            "not nearly identical",
+            f"{deep[0]:.2f} and {deep[1]:.2f} pixels deep, their profiles differ by up to {pair.max():.2f} "
+            f"(at ρ = {RHO[pair.argmax()]:.1f}), {ratio:.0f} times what the difference in distance explains",
+            bool(pair.max() > 0.05 and ratio > 10),
+            note="The profiles differ by no more than their distances.",
+        ),
+        judged(
+            "Of all profiles, those two are the closer ones, for their comparable distance (2.2).",
+            "closer profiles",
+            f"mean difference of the finger's profile from that of its twin {pair.mean():.3f}, from the "
+            f"others at least {others.min():.3f}; of all pairs, {closest}",
+            bool(pair.mean() < others.min()),
+            note="A thin part changes a profile by more than a difference in distance does.",
+        ),
+    )
 
 
 def figure_nodes(hyperfield: Hyperfield, nodes: NDArray[np.int64]) -> Figure:

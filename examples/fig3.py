@@ -45,7 +45,6 @@ def make(data: Data) -> Finding:
     fields = {shape.name: spem.sweep(shape, RHO).fields() for shape in (hand, disk)}
     ratio = {shape.name: spread_ratios(shape, fields[shape.name], SHOWN) for shape in (hand, disk)}
     exact = {shape.name: spread_along_curve(shape, fields[shape.name], SHOWN) for shape in (hand, disk)}
-    table = [(depth, spread_ratios(hand, fields[hand.name], depth)) for depth in DEPTHS]
     here, there = ratio[hand.name], ratio[disk.name]
     mean = {name: float(values.mean()) for name, values in exact.items()}
     claim = judged(
@@ -60,12 +59,6 @@ def make(data: Data) -> Finding:
         bool(here["sub-voxel"].min() > 2 and here["pixel"].min() > 2),
         note="At some ρ the spread is no more than twice what the band's width explains.",
     )
-    rows = tuple(
-        (f"{depth}", *(f"{values[kind][k]:.1f}" for kind in ("sub-voxel", "pixel") for k in (0, 16, 56)))
-        for depth, values in table
-    )
-    head = ("depth", *(f"ρ = {RHO[k]:g}{how}" for how in ("", ", pixels' distance") for k in (0, 16, 56)))
-    caption = "Spread of v at equal depth over the spread that the band's width explains, by depth in pixels."
     figure = figure_spread(hand, fields[hand.name], here["sub-voxel"], there["sub-voxel"])
     return Finding(
         found.source,
@@ -78,8 +71,21 @@ def make(data: Data) -> Finding:
                 "more v spreads than the band's width explains.",
             ),
         ),
-        tables=(Table(caption, head, rows),),
+        tables=(table_depths(hand, fields[hand.name]),),
         numbers={"rho": RHO, "hand": here, "disk": there, "exact_hand": exact[hand.name], "exact": mean},
+    )
+
+
+def table_depths(hand: spem.Shape, fields: Array) -> Table:
+    """Return the ratios at several depths for a small, a middle and a large ρ."""
+    columns = [(kind, k) for kind in ("sub-voxel", "pixel") for k in (0, 16, RHO.size - 1)]
+    head = [f"ρ = {RHO[k]:g}{', pixels' if kind == 'pixel' else ''}" for kind, k in columns]
+    found = [(depth, spread_ratios(hand, fields, depth)) for depth in DEPTHS]
+    return Table(
+        "Spread of v at one depth over what the band's width explains, by depth in pixels; on the right by "
+        "the distances of the pixels.",
+        ("depth", *head),
+        tuple((f"{depth}", *(f"{ratio[kind][k]:.1f}" for kind, k in columns)) for depth, ratio in found),
     )
 
 

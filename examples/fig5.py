@@ -54,8 +54,7 @@ def make(data: Data) -> Finding:
         Picture("fall", figure_fall(fields), "The largest log v at each distance from its source."),
     )
     numbers = {
-        "median_slope": over,
-        "slope": {"from finger": slopes[0], "from palm": slopes[1]},
+        "slope": {"from finger": slopes[0], "from palm": slopes[1]} | {f"in {k}": v for k, v in over.items()},
         "finger_width": width,
         "slope_times_width_over_pi": slopes[0] * width / np.pi,
         "least_log": fields.log[0].min(),
@@ -94,8 +93,8 @@ def fall_claims(over: dict[str, float], slopes: list[float], width: float) -> tu
 
 def envelope(fields: SourceFields, source: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the largest log v at each distance from a source, in steps of a pixel."""
-    points, start = fields.sources.system.shape.points, fields.sources.position[source]
-    step = np.linalg.norm(points - start, axis=1).astype(int)
+    away = fields.sources.system.shape.points - fields.sources.position[source]
+    step = np.linalg.norm(away, axis=1).astype(int)
     top = np.full(int(step.max()) + 1, -np.inf)
     np.maximum.at(top, step, fields.log[source])
     return np.arange(0.5, top.size), top
@@ -103,9 +102,8 @@ def envelope(fields: SourceFields, source: int) -> tuple[NDArray[np.float64], ND
 
 def slope(fields: SourceFields, source: int) -> float:
     """Return by how much log v falls per pixel where it falls least."""
-    away, top = envelope(fields, source)
-    near = (away >= RANGE[0]) & (away <= RANGE[1])
-    return float(-np.polyfit(away[near], top[near], 1)[0])
+    away, top = (values[int(RANGE[0]) : int(RANGE[1])] for values in envelope(fields, source))
+    return float(-np.polyfit(away, top, 1)[0])
 
 
 def figure_fall(fields: SourceFields) -> Figure:

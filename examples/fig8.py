@@ -64,9 +64,8 @@ def make(data: Data) -> Finding:
     )
     head = ("finger", "shared by both, of either", "of the later, within the earlier")
     caption = "Nodes of each finger's component among six and among twelve."
-    return Finding(
-        found.source, part_claims(numbers), pictures, tables=(Table(caption, head, rows),), numbers=numbers
-    )
+    table = Table(caption, head, rows)
+    return Finding(found.source, part_claims(numbers), pictures, tables=(table,), numbers=numbers)
 
 
 def part_claims(numbers: dict[str, Any]) -> tuple[Claim, ...]:
@@ -95,8 +94,7 @@ def part_claims(numbers: dict[str, Any]) -> tuple[Claim, ...]:
             "With twelve components and a low λ, those of the fingers are preserved (4.1).",
             "preserved",
             f"{own['k12']} fingers still have a component of their own, {100 * within:.0f} % of it within "
-            f"that of six; shared by both, of either: {100 * both:.0f} %, since the roots have become "
-            "components",
+            f"that of six; shared by both, of either: {100 * both:.0f} %, for the roots have split off",
             own["k12"] == 5 and within > 0.5,
             note="Fingers are divided further.",
         ),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from spem.paper.equidistance import BAND, spread_along_curve, spread_ratios
-from spem.paper.limbs import node_depth
+from spem.paper.data import Data
+from spem.paper.equidistance import BAND, distinct_nodes, spread_along_curve, spread_ratios
+from spem.paper.limbs import fingers, node_depth
+from spem.paper.silhouettes import chosen
 from spem.shapes.synthetic import disk
 
 
@@ -25,3 +27,14 @@ def test_a_field_of_something_else_has_a_large_ratio():
     fields = (0.01 * node_depth(shape) + other)[:, None]
     assert spread_ratios(shape, fields, 6.0)["sub-voxel"][0] > 50
     assert spread_along_curve(shape, fields, 6.0)[0] > BAND
+
+
+def test_distinct_nodes_lie_where_they_should():
+    """The first is the deepest of all; the last two are equally deep, one in a finger and one in the palm."""
+    (hand,) = chosen(Data(), "hand").shapes
+    nodes, depth = distinct_nodes(hand), node_depth(hand)
+    core = fingers(hand).core
+    assert np.unique(nodes).size == 5
+    assert depth[nodes[0]] == depth[core].max()
+    assert abs(depth[nodes[3]] - depth[nodes[4]]) < 0.1
+    assert core[nodes].tolist() == [True, True, True, False, True]

@@ -1,4 +1,4 @@
-"""The spread of a field among nodes that are equally far from the boundary (Fig. 3)."""
+"""Nodes of a silhouette by their depth, and the spread of a field among equally deep ones (Fig. 2, 3)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,14 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import distance_transform_edt
 
 from spem.fields.isocontours import iso_contours
-from spem.paper.limbs import node_depth
+from spem.paper.limbs import fingers, node_depth
 from spem.shapes.shape import Shape
 
 # Half the width of a band of depth, in pixels; and of the wider one that the fall of v is taken from.
 BAND, FALL = 0.25, 1.0
+
+# How near a depth that is looked for, in pixels; the middle of a finger, as a share of its length.
+NEAR, MIDDLE = 0.1, 0.15
 
 Array = NDArray[np.floating[Any]]
 
@@ -73,3 +76,35 @@ def spread_along_curve(shape: Shape, fields: Array, at: float) -> Array:
     lines = np.vstack(iso_contours(shape, node_depth(shape), [at])[0])
     values = RegularGridInterpolator(shape.axes, shape.to_grid(fields, 1.0))(lines)
     return np.asarray(values.std(axis=0))
+
+
+def distinct_nodes(hand: Shape) -> NDArray[np.int64]:
+    """Choose five nodes of a hand of distinct character (Fig. 2).
+
+    The deepest one; two of the palm at two thirds and one third of its depth; the deepest one in the middle
+    of the longest finger; and one of the palm that is as deep. Those of the palm are as far from fingers and
+    from the nodes before them as their depth allows.
+
+    Parameters
+    ----------
+    hand
+        A silhouette with five fingers.
+
+    Raises
+    ------
+    ParameterError
+        If it has fewer.
+    """
+    found, depth, points = fingers(hand), node_depth(hand), hand.points
+    lengths = [found.length(finger) for finger in range(len(found.inside))]
+    longest = int(np.argmax(lengths))
+    away = np.linalg.norm(points - points[found.tip(longest)], axis=1) / lengths[longest]
+    middle = found.inside[longest] & (np.abs(away - 0.5) < MIDDLE)
+    chosen = {0: int(np.where(found.core, depth, 0).argmax()), 3: int(np.where(middle, depth, 0).argmax())}
+    limbs = points[~found.core]
+    for place, wanted in ((4, depth[chosen[3]]), (1, depth.max() * 2 / 3), (2, depth.max() / 3)):
+        level = np.flatnonzero(found.core & (np.abs(depth - wanted) < NEAR))
+        others = np.vstack([limbs, points[list(chosen.values())]])
+        clear = np.linalg.norm(points[level][:, None] - others, axis=2).min(axis=1)
+        chosen[place] = int(level[clear.argmax()])
+    return np.array([chosen[place] for place in range(5)])

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
-    from numpy.typing import ArrayLike
+    from matplotlib.transforms import Transform
+    from numpy.typing import ArrayLike, NDArray
 
     from spem.shapes.shape import Shape
 
@@ -31,6 +32,8 @@ SQUEEZE, SHEAR = 0.42, 0.45
 STEP = 1.02
 # Lines of equal value on a slice.
 LINES = 7
+# Colour of the edge of a slice.
+RIM = "#b9bfc6"
 
 
 def draw_stack(
@@ -81,37 +84,13 @@ def draw_stack(
         msg = f"{fields.shape[1]} slices need as many words, not {len(words)}"
         raise ParameterError(msg)
     left, right, bottom, top = extent(shape)
-    level = surface_level(shape)
-    outline = contour_lines(shape, level)
-    outline_path = Path.make_compound_path(*[Path(line) for line in outline])
     lift = STEP * SQUEEZE * (bottom - top)
     for k, (column, word) in enumerate(zip(fields.T, words, strict=True)):
         # Down the picture is toward the viewer; upward in the stack is less of y.
         tilt = Affine2D.from_values(1, 0, -SHEAR, SQUEEZE, SHEAR * bottom, -lift * k)
         frame = tilt.transform([(left, top), (right, top), (right, bottom), (left, bottom)])
-        where = tilt + ax.transData
-        ax.fill(*frame.T, facecolor="white", edgecolor="#b9bfc6", linewidth=0.6, alpha=0.82, zorder=k)
-        grid = extend_values(shape, column, level)
-        image = ax.imshow(
-            grid,
-            cmap=FIELD_CMAP,
-            vmin=limits[0],
-            vmax=limits[1],
-            extent=(left, right, bottom, top),
-            interpolation="bilinear",
-            transform=where,
-            zorder=k + 0.2,
-        )
-        steps = np.linspace(*limits, LINES + 2)[1:-1]
-        traced = [line for step in steps for line in contour_lines(shape, grid, float(step))]
-        lines = LineCollection(traced, colors="white", linewidths=0.4, alpha=0.75, transform=where)
-        lines.set_zorder(k + 0.3)
-        ax.add_collection(lines, autolim=False)
-        for artist in (image, lines):
-            artist.set_clip_path(outline_path, where)
-        line = PathPatch(outline_path, fill=False, edgecolor=INK, linewidth=0.6, transform=where)
-        line.set_zorder(k + 0.4)
-        ax.add_patch(line)
+        ax.fill(*frame.T, facecolor="white", edgecolor=RIM, linewidth=0.6, alpha=0.82, zorder=k)
+        _draw_slice(shape, column, ax, tilt + ax.transData, limits, k)
         x, y = frame[3]
         ax.text(x - 0.02 * (right - left), y, word, ha="right", va="bottom", fontsize=TEXT_SIZE)
     bare(ax, title)
@@ -122,3 +101,36 @@ def draw_stack(
         ylim=(SQUEEZE * bottom + 0.02 * height, SQUEEZE * bottom - 1.02 * height),
     )
     ax.set_aspect("equal")
+
+
+def _draw_slice(
+    shape: Shape,
+    values: NDArray[np.float64],
+    ax: Axes,
+    where: Transform,
+    limits: tuple[float, float],
+    order: int,
+) -> None:
+    """Draw one field with its lines of equal value and its outline, above the slices of lower order."""
+    level = surface_level(shape)
+    grid = extend_values(shape, values, level)
+    outline = Path.make_compound_path(*[Path(line) for line in contour_lines(shape, level)])
+    image = ax.imshow(
+        grid,
+        cmap=FIELD_CMAP,
+        vmin=limits[0],
+        vmax=limits[1],
+        extent=extent(shape),
+        interpolation="bilinear",
+        transform=where,
+        zorder=order + 0.2,
+    )
+    steps = np.linspace(*limits, LINES + 2)[1:-1]
+    traced = [line for step in steps for line in contour_lines(shape, grid, float(step))]
+    lines = LineCollection(traced, colors="white", linewidths=0.4, alpha=0.75, transform=where)
+    lines.set_zorder(order + 0.3)
+    ax.add_collection(lines, autolim=False)
+    for artist in (image, lines):
+        artist.set_clip_path(outline, where)
+    rim = PathPatch(outline, fill=False, edgecolor=INK, linewidth=0.6, transform=where, zorder=order + 0.4)
+    ax.add_patch(rim)
