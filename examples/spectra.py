@@ -77,8 +77,8 @@ def claims_of(found: KindScores, name: str, absent: str, *, tested: bool) -> lis
         "representation power, verified experimentally",
         every if tested else "not measured",
         ahead[-1],
-        note=f"{words[-1]}, where seeds differ by up to {deviation:.1f}. The paper compares with heat kernels "
-        "of surfaces in codes of their own; its code serves those of volumes as well."
+        note=f"{words[-1]}, where seeds differ by up to {deviation:.1f}. The paper compares with heat "
+        "kernels of surfaces in codes of their own; its code serves those of volumes as well."
         if tested
         else absent,
         tested=tested,

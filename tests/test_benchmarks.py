@@ -20,6 +20,7 @@ WITHOUT_DATA = (
     "patches",
     "source_accuracy",
     "source_speed",
+    "spectra",
     "startup",
     "sweep_accuracy",
     "sweep_scaling",
