@@ -35,6 +35,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Resolve what Sphinx cannot, and leave out what scikit-learn adds to its estimators."""
     app.connect("missing-reference", _resolve)
     app.connect("autodoc-skip-member", _skip)
+    app.connect("doctree-read", _link)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
@@ -52,6 +53,17 @@ def _resolve(
             return domain.resolve_xref(env, node["refdoc"], app.builder, role or "obj", name, node, content)
     # Types of other packages, and those of ours that are not promised, have no page here.
     return content if node.get("reftype") in ("class", "data", "exc") else None
+
+
+def _link(app: Sphinx, document: nodes.document) -> None:
+    """Make links of public names that stand as code in the words of a page."""
+    for code in list(document.findall(nodes.literal)):
+        name = code.astext().partition("(")[0]
+        inside = isinstance(code.parent, (pending_xref, nodes.reference, nodes.title))
+        if not inside and name.removeprefix("spem.").partition(".")[0] in spem.__all__ and "." in name:
+            link = pending_xref("", refdomain="py", reftype="obj", reftarget=name, refdoc=app.env.docname)
+            code.replace_self(link)
+            link += code
 
 
 def _public(target: str) -> list[str]:

@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
+from hashlib import sha256
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -134,11 +135,9 @@ def _real(item: Item, real: Mapping[str, Any]) -> str:
         needs = f" It needs {', '.join(f'``{name}``' for name in item.needs)}." if item.needs else ""
         return f"No run on real shapes is recorded.{needs}"
     facts = real["made"]
-    origin = (
-        f"spem {facts['spem']}, {facts['seconds']:.0f} s."
-        if facts["seconds"] >= 1
-        else f"spem {facts['spem']}."
-    )
+    origin = f"Made by spem {facts['spem']} in {facts['seconds']:.3g} s."
+    if facts["script"] != sha256(item.script.read_bytes()).hexdigest()[:16]:
+        origin += " The script has changed since."
     numbers = json.dumps(real["numbers"], indent=1, ensure_ascii=False)
     parts = [f"{_line(real['shapes'])} {origin}", *map(_claim, real["claims"])]
     if real["numbers"]:
