@@ -19,7 +19,7 @@ from scipy import ndimage
 import spem
 from _table import Benchmark, Row, alternating, slope
 from spem.fields.geodesics import source_distances
-from spem.paper.ways import Way, u_way
+from spem.paper.geodesics import Way, u_way
 from spem.shapes.shape import Shape
 
 Array = NDArray[np.float64]

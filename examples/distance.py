@@ -20,7 +20,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.paper import limits
+from spem.paper import distance
 from spem.paper.data import Data, Silhouette
 from spem.paper.distance_pictures import figure_errors, figure_where
 from spem.paper.findings import Claim, Finding, Picture, Table, judged
@@ -41,19 +41,19 @@ def make(data: Data) -> Finding:
     radius = 30.0 if data.quick else 100.0  # of all shapes, in voxels
     shares = np.geomspace(0.4, SMALLEST / radius, 6)
     found = {kind: chosen(data, kind, inner_radius=radius) for kind in KINDS}
-    silhouettes = [limits.silhouette_cases(shapes.shapes[0], kind) for kind, shapes in found.items()]
-    cases = [*limits.known_cases(radius), *chain(*silhouettes)]
-    error = {case.name: limits.errors(case, shares) for case in cases}
+    silhouettes = [distance.silhouette_cases(shapes.shapes[0], kind) for kind, shapes in found.items()]
+    cases = [*distance.known_cases(radius), *chain(*silhouettes)]
+    error = {case.name: distance.errors(case, shares) for case in cases}
     mean = {name: np.abs(values).mean(axis=1) for name, values in error.items()}
     fitted = shares <= FITTED
-    rates = {name: limits.rate(shares[fitted], values[fitted]) for name, values in mean.items()}
-    least = limits.rate(shares[fitted], shares[fitted] * np.log(1 / shares[fitted]))
-    better = {name: np.median(np.abs(limits.extrapolated(shares, e)), axis=1) for name, e in error.items()}
-    grid, beyond = limits.grid_share(cases[0], shares, error["disk"]), limits.disk_remainder(EXPANSION)
+    rates = {name: distance.rate(shares[fitted], values[fitted]) for name, values in mean.items()}
+    least = distance.rate(shares[fitted], shares[fitted] * np.log(1 / shares[fitted]))
+    better = {name: np.median(np.abs(distance.extrapolated(shares, e)), axis=1) for name, e in error.items()}
+    grid, beyond = distance.grid_share(cases[0], shares, error["disk"]), distance.disk_remainder(EXPANSION)
     where = figure_where([pair[0] for pair in silhouettes], [error[kind] for kind in KINDS], shares)
     return Finding(
         found["cat"].source,
-        (limit(shares, mean), speed(rates, least), on_disk(limits.rate(EXPANSION, beyond), grid)),
+        (limit(shares, mean), speed(rates, least), on_disk(distance.rate(EXPANSION, beyond), grid)),
         (
             Picture("errors", figure_errors(shares, mean, cases[0], error["disk"]), ERRORS),
             Picture("where", where, WHERE),

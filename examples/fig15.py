@@ -18,7 +18,7 @@ import spem
 from spem.paper.consistency import distribution_distances, pairs
 from spem.paper.data import Data
 from spem.paper.findings import Finding, Picture, judged
-from spem.paper.poses import SIDE_VIEW, Region, clear_values, pose_maps, regions, shadow
+from spem.paper.pose_regions import SIDE_VIEW, Region, clear_values, pose_maps, regions, shadow
 from spem.paper.present import present
 from spem.plots.camera import view_rotation
 from spem.plots.figures import map_name

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 import spem
 from spem.embedding.histograms import hellinger_distances, joint_histogram, map_limits
+from spem.paper.class_distances import ClassDistances
 from spem.paper.data import Data
 from spem.paper.findings import Claim, Finding, Picture, judged
-from spem.paper.kinship import Kinship
 from spem.paper.present import present
 from spem.plots.joint import figure_joint_histograms
 
@@ -31,7 +31,7 @@ def make(data: Data) -> Finding:
     shapes = [i if isinstance(i, spem.Shape) else spem.read(i, voxels=VOXELS) for i in found.items]
     several = [spem.maps(shape, N_MAPS) for shape in shapes]
     kin = {
-        pair: Kinship.of(hellinger_distances(histograms(several, *pair)), found.labels)
+        pair: ClassDistances.of(hellinger_distances(histograms(several, *pair)), found.labels)
         for pair in combinations(range(N_MAPS), 2)
     }
     chosen = kin[Y, X]
@@ -57,7 +57,7 @@ def histograms(several: list[spem.Maps], y: int, x: int) -> NDArray[np.float64]:
     return np.array([joint_histogram(v[:, x], v[:, y], ends, BINS) for v in values])
 
 
-def claims(kin: dict[tuple[int, int], Kinship], real: bool, data: Data) -> tuple[Claim, ...]:
+def claims(kin: dict[tuple[int, int], ClassDistances], real: bool, data: Data) -> tuple[Claim, ...]:
     """Judge what is said of the histograms."""
     chosen, others = kin[Y, X], [k.nearest for pair, k in kin.items() if pair != (Y, X)]
     near, rank, apart = chosen.pair("man", "woman") if real else (0.0, 0, False)

@@ -17,13 +17,13 @@ Neither a logarithm nor a square root turns a gradient.)
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.paper import ways
+from spem.paper import geodesics
 from spem.paper.data import Data
+from spem.paper.distance import rate
 from spem.paper.findings import Claim, Finding, Picture, judged
-from spem.paper.limits import rate
+from spem.paper.geodesic_pictures import figure_angles, figure_rates
 from spem.paper.present import present
 from spem.paper.silhouettes import chosen
-from spem.paper.way_pictures import figure_angles, figure_rates
 
 Array = NDArray[np.float64]
 SMALLEST = 4.0  # ρ in voxels
@@ -36,14 +36,14 @@ def make(data: Data) -> Finding:
     """Compare values and gradients of single-source fields with shortest ways, as ρ falls."""
     radius = 30.0 if data.quick else 100.0  # inner radius of the hand, in voxels
     found = chosen(data, "hand", inner_radius=radius)
-    u, marched = ways.u_way(70 if data.quick else 200)
-    cases = (u, ways.tip_way(found.shapes[0], "hand"))
+    u, marched = geodesics.u_way(70 if data.quick else 200)
+    cases = (u, geodesics.tip_way(found.shapes[0], "hand"))
     shares = np.geomspace(0.6, SMALLEST / radius, 6)  # ρ over the inner radius
     mean, turned = {}, {}
     for way in cases:
         rho = shares * way.depth.max()
-        mean[way.name] = np.array([np.abs(ways.difference(way, r)).mean() for r in rho])
-        turned[way.name] = [ways.angles(way, r) for r in (np.inf, *rho)]
+        mean[way.name] = np.array([np.abs(geodesics.difference(way, r)).mean() for r in rho])
+        turned[way.name] = [geodesics.angles(way, r) for r in (np.inf, *rho)]
     angle = {name: np.array([np.quantile(a, (0.5, 0.9)) for a, _ in each]) for name, each in turned.items()}
     inward = {name: [float(up.mean()) for _, up in each] for name, each in turned.items()}
     rates = {name: rate(shares[2:], values[2:]) for name, values in mean.items()}

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 
 import spem
 from spem.paper.data import Data
-from spem.paper.expansion import left_out, smooth_shapes
 from spem.paper.findings import Claim, Finding, Picture, judged
+from spem.paper.level_expansion import left_out, smooth_shapes
 from spem.paper.level_pictures import figure_family, figure_smoothing
+from spem.paper.level_smoothness import at_areas, smoothness
 from spem.paper.present import present
 from spem.paper.silhouettes import chosen
-from spem.paper.smoothness import at_areas, smoothness
 
 RHO = (4.0, 8.0, 16.0, 32.0, 64.0)
 LEVELS = np.round(np.arange(0.9, 0.05, -0.1), 1)

@@ -20,7 +20,7 @@ from spem.paper.findings import Claim, Finding, Picture, judged
 from spem.paper.limbs import fingers
 from spem.paper.present import present
 from spem.paper.silhouettes import chosen
-from spem.paper.transforms import figure_bias, figure_paths, measure_transform, sampled_times
+from spem.paper.transform import figure_bias, figure_paths, measure_transform, sampled_times
 
 # In units of the inner radius.
 RHO = 0.3

@@ -19,8 +19,8 @@ from spem.fields.walks.transient import decay_rate
 from spem.paper.data import Data
 from spem.paper.findings import Claim, Finding, Picture, judged
 from spem.paper.present import present
-from spem.paper.settling import Settling, figure_settling, kernel_errors, poisson_error, settle
 from spem.paper.silhouettes import chosen
+from spem.paper.transient import Settling, figure_settling, kernel_errors, poisson_error, settle
 from spem.plots.figures import figure_fields
 
 # In units of the inner radius.

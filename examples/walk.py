@@ -21,8 +21,8 @@ from spem.fields.walks.killed import killed_walk
 from spem.paper.data import Data
 from spem.paper.findings import Claim, Finding, Picture, judged
 from spem.paper.present import present
+from spem.paper.walk import check_walks, coverage, ten_shapes, time_spent
 from spem.paper.walk_pictures import figure_intervals, figure_walks
-from spem.paper.walkers import check_walks, coverage, ten_shapes, time_spent
 
 # ρ over the size of a shape.
 SHARES = (0.06, 0.2)

@@ -13,7 +13,7 @@ import spem
 from spem.errors import ParameterError
 from spem.fields.domain import surface_domain
 from spem.fields.geodesics import inner_distances, source_distances
-from spem.paper.ways import u_way
+from spem.paper.geodesics import u_way
 from spem.shapes.shape import Cuts, Shape
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import spem
+from spem.paper.class_distances import ClassDistances
 from spem.paper.consistency import (
     PAPER_RHO,
     basis_cosines,
@@ -16,8 +17,7 @@ from spem.paper.consistency import (
     largest_subspace_angle,
     paper_rho,
 )
-from spem.paper.kinship import Kinship
-from spem.paper.poses import clear_values, pose_maps, regions, shadow
+from spem.paper.pose_regions import clear_values, pose_maps, regions, shadow
 from spem.paper.regions import region_sizes, roughness, separation, separation_at_depth
 from spem.paper.scaling import scaled, signal_to_noise, values_at
 
@@ -97,10 +97,10 @@ def test_pieces_below_a_share_are_left_out():
 def test_kin_that_mix_are_not_apart():
     """One shape nearer to another kind than to its own."""
     points = np.array([0.0, 1.0, 2.9, 4.0, 9.0, 9.5])
-    found = Kinship.of(np.abs(points[:, None] - points), ["a", "a", "b", "b", "c", "c"])
+    found = ClassDistances.of(np.abs(points[:, None] - points), ["a", "a", "b", "b", "c", "c"])
     assert found.nearest == 1.0
     points[2] = 1.6
-    mixed = Kinship.of(np.abs(points[:, None] - points), ["a", "a", "b", "b", "c", "c"])
+    mixed = ClassDistances.of(np.abs(points[:, None] - points), ["a", "a", "b", "b", "c", "c"])
     assert mixed.pair("a", "b")[2] is False
     assert mixed.pair("a", "b")[1] == 1
 

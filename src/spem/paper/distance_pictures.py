@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from spem.paper.limits import Case
+from spem.paper.distance import Case
 from spem.plots.fields import draw_outline, draw_values
 from spem.plots.style import (
     COLOURS,

@@ -1,4 +1,4 @@
-"""Pictures of random walks."""
+"""Pictures of random walks and of their intervals (3.1)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from spem.fields.walks.killed import Walk
-    from spem.paper.walkers import Check
+    from spem.paper.walk import Check
 
 
 def figure_walks(walk: Walk, rng: np.random.Generator) -> Figure:
@@ -67,7 +67,7 @@ def figure_intervals(checks: list[Check]) -> Figure:
 
     Examples
     --------
-    >>> from spem.paper.walkers import check_walks
+    >>> from spem.paper.walk import check_walks
     >>> from spem.shapes.synthetic import ball
     >>> check = check_walks(ball(2.0, 1.0), 0.5, 3, 50, 3, np.random.default_rng(0))
     >>> len(figure_intervals([check]).axes)

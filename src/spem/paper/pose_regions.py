@@ -1,4 +1,4 @@
-"""Solids in several poses: their maps, the regions beyond thresholds, and the same poses as silhouettes."""
+"""Solids in poses: their maps, the regions beyond thresholds, and the same poses as silhouettes (Fig. 15)."""
 
 from __future__ import annotations
 

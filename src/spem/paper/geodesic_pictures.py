@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from spem.fields.isocontours import iso_contours
-from spem.paper.ways import Way, difference
+from spem.paper.geodesics import Way, difference
 from spem.plots.fields import draw_outline, draw_values
 from spem.plots.style import COLOURS, INK, MARKERS, MUTED, TEXT_SIZE, bare, framed, new_figure
 

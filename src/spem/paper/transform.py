@@ -1,4 +1,4 @@
-"""What Doob's transform does to a walk: figures and pictures."""
+"""What Doob's transform does to a walk: figures and pictures (3.3)."""
 
 from __future__ import annotations
 

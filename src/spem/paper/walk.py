@@ -1,4 +1,4 @@
-"""Ten shapes for random walks, and how many intervals hold."""
+"""Walks on ten shapes beside the solver, and how many intervals hold (3.1)."""
 
 from __future__ import annotations
 

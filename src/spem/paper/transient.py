@@ -1,4 +1,4 @@
-"""How the field comes to rest, and the kernels of section 3.1."""
+"""How the field comes to rest, and the kernels of the transformed walk (3.1, 3.4)."""
 
 from __future__ import annotations
 
