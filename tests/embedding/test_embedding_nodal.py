@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -30,6 +32,19 @@ def test_thresholds_midway_hold_whole_clusters():
     assert nodal_clusters(shapes) == pytest.approx(np.array([[-5.0, 0.0, 8.0]]), abs=0.05)
     found = nodal_domains(shapes[0], nodal_thresholds(shapes, at="midway"))
     assert [(found == side).sum() for side in (-1, 0, 1)] == [30, 100, 60]
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.integers(-30, 30), min_size=3, max_size=12).filter(lambda values: len(set(values)) > 2))
+def test_clusters_are_those_of_least_inertia(values: list[int]):
+    """Of a few values, no division into three runs has less inertia."""
+    ordered = np.sort(np.array(values, float))
+    means = nodal_clusters([ordered[:, None]])[0]
+    least = min(
+        sum(np.square(run - run.mean()).sum() for run in np.split(ordered, [i, j]))
+        for i, j in combinations(range(1, ordered.size), 2)
+    )
+    assert np.square(ordered[:, None] - means).min(axis=1).sum() == pytest.approx(least, abs=1e-9)
 
 
 def test_thresholds_count_every_shape_the_same():

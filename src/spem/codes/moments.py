@@ -94,7 +94,7 @@ class NodalMoments(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstima
     nodes_per_shape
         Number of nodes drawn from each shape for the thresholds.
     random_state
-        Seed or generator of the draw and of k-means.
+        Seed or generator of the draw.
 
     Attributes
     ----------
