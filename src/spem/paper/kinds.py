@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from os import cpu_count
 from pathlib import Path
 from typing import Any, get_args
 
@@ -18,10 +17,9 @@ from spem.codes.settings import Features as Kind
 from spem.codes.settings import Settings
 from spem.codes.sources import read_shapes
 from spem.codes.spectral import shape_spectrum, spectral_features
-from spem.codes.workers import count_processes, run_all
-from spem.errors import ReadError, SpemError
+from spem.errors import SpemError
 from spem.paper.data import Collection
-from spem.paper.scoring import Features, Repeated, repeat
+from spem.paper.scoring import Features, Repeated, compute_all, repeat
 from spem.shapes.shape import Shape
 
 # Features of these kinds at a smaller number are the first of those at a larger; other signatures spread
@@ -131,17 +129,8 @@ def collect_kinds(
     """
     items = collection.items
     work = partial(_made, items=items, counts=tuple(counts), voxels=voxels, n_pairs=n_pairs)
-    jobs = min(cpu_count() or 1, count_processes(len(items)))
-    found: dict[int, Made] = {}
-    for index, made, reason in run_all(work, range(len(items)), jobs):
-        if made is None:
-            msg = f"{items[index]}: no features ({reason}); mend the file or take it out of the collection"
-            raise ReadError(msg)
-        found[index] = made
-    return {
-        key: Features(tuple(found[index][key] for index in range(len(items))), collection.labels)
-        for key in found[0]
-    }
+    found = compute_all(work, items)
+    return {key: Features(tuple(made[key] for made in found), collection.labels) for key in found[0]}
 
 
 def kind_settings(kind: Kind, count: int, *, voxels: int, n_pairs: int, n_centers: int = 64) -> Settings:

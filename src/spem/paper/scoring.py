@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from os import cpu_count
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -25,6 +26,7 @@ from spem.retrieval.evaluation import MEASURES, Scores, evaluate
 from spem.shapes.creatures import creature, creature_kinds
 from spem.shapes.shape import Shape
 
+T = TypeVar("T")
 _RESAMPLES = 2000
 
 
@@ -102,16 +104,37 @@ def features_of(items: Sequence[Path | Shape], settings: Settings) -> tuple[Band
     ReadError
         If a shape gives none.
     """
-    work = partial(_features, items=tuple(items), settings=settings)
-    found: dict[int, Bands] = {}
-    for index, bands, reason in run_all(
-        work, range(len(items)), min(cpu_count() or 1, count_processes(len(items)))
-    ):
-        if bands is None:
+    return tuple(compute_all(partial(_features, items=tuple(items), settings=settings), items))
+
+
+def compute_all(work: Callable[[int], T], items: Sequence[Path | Shape]) -> list[T]:
+    """Compute something of every item, on all cores.
+
+    Parameters
+    ----------
+    work
+        Function of a module; takes the number of an item.
+    items
+        Shapes and files, named where one fails.
+
+    Raises
+    ------
+    ReadError
+        If an item gives nothing.
+
+    Examples
+    --------
+    >>> from spem.shapes.synthetic import disk
+    >>> compute_all(float, [disk(2.0, 1.0), disk(3.0, 1.0)])
+    [0.0, 1.0]
+    """
+    found: dict[int, T] = {}
+    for index, made, reason in run_all(work, range(len(items)), count_processes(len(items))):
+        if made is None:
             msg = f"{items[index]}: no features ({reason}); mend the file or take it out of the collection"
             raise ReadError(msg)
-        found[index] = bands
-    return tuple(found[index] for index in range(len(items)))
+        found[index] = made
+    return [found[index] for index in range(len(items))]
 
 
 def creature_features(ndim: int, each: int, settings: Settings) -> tuple[Bands, ...]:
