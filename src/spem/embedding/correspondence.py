@@ -12,8 +12,9 @@ from scipy.spatial import KDTree
 
 from spem.embedding.maps import Maps
 from spem.errors import ParameterError, require_kind
-from spem.fields.operator import System, assemble
+from spem.fields.operator import assemble
 from spem.fields.solvers.multifrontal import factorize
+from spem.fields.spectrum import free_system
 from spem.shapes.shape import Shape
 
 # Lengths of surroundings in units of L = volume^(1/d): a limb's width, a limb, half the body.
@@ -99,7 +100,9 @@ def surroundings(shape: Shape, values: ArrayLike, lengths: Sequence[float] = LEN
     if not lengths or not all(0 < length < np.inf for length in lengths):
         msg = f"lengths={tuple(lengths)}: expected positive lengths, in units of the shape's size"
         raise ParameterError(msg)
-    system = _reflecting(assemble(shape))
+    whole = assemble(shape)
+    # M weighs nodes beside the surface less: matches across poses are then nearer than with equal weights
+    system = replace(free_system(whole), mass=whole.mass)
     averages = []
     for length in lengths:
         rate = (length * shape.size) ** -2.0
@@ -155,13 +158,6 @@ def match_nodes(source: ArrayLike, target: ArrayLike) -> NDArray[np.int64]:
         msg = "features hold NaN or inf; expected finite numbers for all nodes"
         raise ParameterError(msg)
     return np.asarray(KDTree(other).query(own)[1], np.int64)
-
-
-def _reflecting(system: System) -> System:
-    """Leave the boundary edges out of a system: its walk never leaves the shape."""
-    inside = system.domain.neighbours < system.n_nodes
-    diagonal = inside.astype(np.float64) @ np.repeat(system.weights, 2)
-    return replace(system, rhs=np.zeros(system.n_nodes), diagonal=diagonal)
 
 
 def _columns(shape: Shape, values: ArrayLike) -> NDArray[np.float64]:
