@@ -7,21 +7,16 @@ deviation over the collection, and takes a power of the residuals. Each is said 
 out in turn, and the rest kept as it is.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from spem.codes.settings import Settings
-from spem.codes.vlad import vlad
-from spem.codes.vocabulary import Vocabulary
-from spem.paper.data import Collection, Data
+from spem.paper.ablation import WHOLE, leave_out
+from spem.paper.data import Data
 from spem.paper.findings import Claim, Finding, Picture, Table, judged
 from spem.paper.present import present
-from spem.paper.scoring import Features, Repeated, collect, repeat, summarise
+from spem.paper.scoring import Repeated
 from spem.plots.style import COLOURS, framed, new_figure
-from spem.retrieval.distances import correlation_distance
 from spem.retrieval.evaluation import MEASURES
 
 COLLECTIONS = {"shrec11": (3, 15_000), "tari1000": (2, 2_000)}
@@ -31,7 +26,6 @@ STATED = {
     "unit length, no deviation": "Weighting by the deviation helps",
     "no power law": "The power law, α = 0.25, helps",
 }
-WHOLE = "as in 5.5"
 
 
 def make(data: Data) -> Finding:
@@ -42,7 +36,7 @@ def make(data: Data) -> Finding:
     for name, (ndim, voxels) in COLLECTIONS.items():
         per_class, voxels = (3, 1200) if data.quick else (None, voxels)
         found = data.collection(name, ndim=ndim, per_class=per_class, voxels=voxels)
-        rows = variants(found, Settings.paper(voxels=voxels), seeds)
+        rows = leave_out(found, Settings.paper(voxels=voxels), seeds)
         results[found.name if found.real else f"creatures, {ndim}-D"] = rows
         cells = tuple((what, *row.row(), f"{row.deviation['FT']:.2f}") for what, row in rows.items())
         caption = f"{name if found.real else f'Creatures, {ndim}-D'}: means over {seeds} seeds, in percent."
@@ -61,31 +55,6 @@ def make(data: Data) -> Finding:
         tables=tuple(tables),
         numbers={name: {what: row.to_json() for what, row in rows.items()} for name, rows in results.items()},
     )
-
-
-def variants(found: Collection, settings: Settings, seeds: int) -> dict[str, Repeated]:
-    """Score the code of 5.5, and what is left of it without each ingredient."""
-    features = collect(found, settings)
-    whole = collect(found, replace(settings, drop_boundary=False))
-    return {
-        WHOLE: repeat(features, settings, seeds),
-        "boundary layer kept": repeat(whole, settings, seeds),
-        "intensities as they are": summarise(
-            [plain(features, settings, s) for s in range(seeds)], found.labels
-        ),
-        "unit length, no deviation": repeat(features, replace(settings, scaling="none"), seeds),
-        "no power law": repeat(features, replace(settings, power=1.0), seeds),
-    }
-
-
-def plain(features: Features, settings: Settings, seed: int) -> NDArray[np.float64]:
-    """Return distances of codes of the projections as they are, brought to no common length."""
-    rng = np.random.default_rng(seed)
-    maps = [bands[0] for bands in features.bands]
-    drawn = [m[rng.integers(len(m), size=settings.nodes_per_shape)] for m in maps]
-    words = Vocabulary(settings.n_centers, random_state=seed).fit(np.concatenate(drawn)).cluster_centers_
-    vectors = np.stack([vlad(m, words.astype(m.dtype), settings.power) for m in maps])
-    return correlation_distance(vectors, vectors)
 
 
 def claim(name: str, what: str, rows: dict[str, Repeated], tested: bool, why: str) -> Claim:
