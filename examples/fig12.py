@@ -97,8 +97,8 @@ def pose_claims(numbers: dict[str, Any], count: int) -> tuple[Claim, ...]:
             "very coherent",
             f"{100 * kept['matched']:.0f} % of the limbs of {count} poses have one number when the poses are "
             f"divided apart and matched, {100 * kept['together']:.0f} % of those of {poses} divided together",
-            max(kept.values()) == 1,
-            note="A leg is taken for another.",
+            kept["matched"] == 1,
+            note="Of parts divided apart, as in the paper, a leg is matched with another leg.",
         ),
         judged(
             "An additional segment, in a leg of one pose only, can be detected by its low intensity (5.2).",

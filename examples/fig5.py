@@ -8,8 +8,7 @@ the palm: in a strip of width w the slowest fall is exp(−π s/w), with or with
 that sets out from the source is lost at the sides. So the logarithm measures a distance in which fingers
 are long and the palm is small: parts come apart (2.3, 3.2).
 
-Streamlines follow the gradient from all over the hand to the source. They keep to the middle of the
-fingers.
+Streamlines follow the gradient from all over the hand to the source, in the middle of the fingers.
 """
 
 import numpy as np

@@ -18,32 +18,29 @@ from numpy.typing import NDArray
 
 import spem
 from spem.paper.agreement import agreement, beyond, correlations, own_partners
-from spem.paper.corresponding import COLLECTIONS, Poses, depth_at, load_poses
+from spem.paper.corresponding import Poses, absent_poses, depth_at, load_poses
 from spem.paper.data import Data
 from spem.paper.findings import Claim, Finding, Picture, judged
 from spem.paper.present import present
 from spem.paper.scaling import values_at
 from spem.plots.style import COLOURS, DASHES, INK, MUTED, TEXT_SIZE, TITLE_SIZE, framed, new_figure
 
-N_MAPS = 20
-ACCURATE = 1e-13
-SHARE = 1e-14
+N_MAPS, ACCURATE, SHARE = 20, 1e-13, 1e-14
 BETWEEN, GRIDS, BEYOND = "between poses", "two grids of one pose", "between poses, beyond depth"
 USUAL = "sweep of 1e-6 against direct"
 CURVES = (BETWEEN, GRIDS, BEYOND, USUAL)
+CAPTION = "Left: share of the variance. Right: mean absolute correlation of each component."
 
 
 def make(data: Data) -> Finding:
     """Measure share and consistency of each component, for each set of poses."""
     sets = load_poses(data, n_inside=500 if data.quick else 1500, n_marks=2)
     found = {poses.name: measure(poses, 32 if data.quick else 64) for poses in sets}
-    there = {poses.collection for poses in sets}
-    missing = "; ".join(data.absent(name) for name in COLLECTIONS if name not in there)
-    caption = "Left: share of the variance. Right: mean absolute correlation of each component."
+    missing = absent_poses(data)
     return Finding(
         " ".join(poses.source for poses in sets),
         (judge(found, missing),),
-        (Picture("variance", draw(found), caption),),
+        (Picture("variance", draw(found), CAPTION),),
         found,
     )
 
@@ -52,13 +49,13 @@ def measure(poses: Poses, n_rho: int) -> dict[str, NDArray[np.float64]]:
     """Return the curves of one set of poses, ``(N_MAPS,)`` each."""
     several = [spem.maps(shape, N_MAPS, n_rho=n_rho, rtol=ACCURATE) for shape in poses.shapes]
     values = [values_at(maps, at) for maps, at in zip(several, poses.inside, strict=True)]
-    depths = [depth_at(maps.shape, at) for maps, at in zip(several, poses.inside, strict=True)]
-    further = [beyond(v, depth) for v, depth in zip(values, depths, strict=True)]
+    further = [
+        beyond(v, depth_at(s, at)) for v, s, at in zip(values, poses.shapes, poses.inside, strict=True)
+    ]
     first = poses.shapes[0]
     finer = spem.maps(poses.finer, N_MAPS, rho=several[0].rho, rtol=ACCURATE)
-    dense, size, _ = np.linalg.svd(
-        spem.field(first, several[0].rho, solver=spem.Direct()), full_matrices=False
-    )
+    direct = spem.field(first, several[0].rho, solver=spem.Direct())
+    dense, size, _ = np.linalg.svd(direct, full_matrices=False)
     usual = spem.maps(first, N_MAPS, rho=several[0].rho)
     return {
         "share": np.mean([maps.explained for maps in several], axis=0),
@@ -76,13 +73,13 @@ def judge(found: dict[str, dict[str, NDArray[np.float64]]], missing: str) -> Cla
     ours, holds = [], True
     for name, curves in found.items():
         last = int(np.flatnonzero(curves["share"] >= SHARE)[-1])
-        own = curves["own partner"][: last + 1]
-        holds &= bool(own.min() > 1 / 2)
+        own = curves["own partner"][: last + 1].min()
+        holds &= bool(own > 1 / 2)
         ours.append(
             f"{name}: component {last + 1} explains {curves['share'][last]:.0e} and correlates "
             f"{curves[BETWEEN][last]:.2f} between poses ({curves[BEYOND][last]:.2f} beyond depth, "
             f"{curves[GRIDS][last]:.2f} between grids of one pose); up to it, components are most like their "
-            f"own counterparts in at least {100 * own.min():.0f} % of the pairs"
+            f"own counterparts in at least {100 * own:.0f} % of the pairs"
         )
     return judged(
         "Consistency is observed even for projections that explain as little as 1e-14 of the variance (4.2).",

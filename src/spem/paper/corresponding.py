@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -144,6 +145,29 @@ def load_poses(data: Data, *, n_inside: int = 1500, n_marks: int = 400) -> list[
         if (folder := data.find(name)) is not None
     ]
     return found or [_creature(data.quick, max(n_inside, n_marks), n_marks, rng)]
+
+
+def absent_poses(data: Data) -> str:
+    """Say which sets of poses are absent and how to get them; empty where none is.
+
+    Examples
+    --------
+    >>> absent_poses(Data()).count("--data")
+    2
+    """
+    return "; ".join(data.absent(name) for name in COLLECTIONS if data.find(name) is None)
+
+
+def absences(data: Data, sets: Sequence[Poses]) -> str:
+    """Say which of the real sets are absent, for the note of a claim; nothing where all are there.
+
+    Examples
+    --------
+    >>> absences(Data(), [])[:31]
+    'no folder of shapes was given; '
+    """
+    there = {poses.collection for poses in sets}
+    return "; ".join(data.absent(name) for name in COLLECTIONS if name not in there)
 
 
 def carried(
