@@ -21,7 +21,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spem.paper.agreement import Agreement
-from spem.paper.corresponding import absent_poses, load_poses
+from spem.paper.corresponding import absences, load_poses
 from spem.paper.data import Data
 from spem.paper.findings import Finding, Picture
 from spem.paper.present import present
@@ -60,7 +60,7 @@ def make(data: Data) -> Finding:
     """Reduce the fields of all poses by all methods and compare at corresponding points."""
     sets = load_poses(data, n_inside=500 if data.quick else 1500, n_marks=2)
     found = {poses.name: measure(poses, N_COMPONENTS, 32 if data.quick else 64) for poses in sets}
-    missing = absent_poses(data)
+    missing = absences(data, sets)
     return Finding(
         " ".join(poses.source for poses in sets),
         tuple(judge(statement, names, found, why, missing) for statement, names, why in RIVALS),

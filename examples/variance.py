@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 import spem
 from spem.paper.agreement import agreement, beyond, correlations, own_partners
-from spem.paper.corresponding import Poses, absent_poses, depth_at, load_poses
+from spem.paper.corresponding import Poses, absences, depth_at, load_poses
 from spem.paper.data import Data
 from spem.paper.findings import Claim, Finding, Picture, judged
 from spem.paper.present import present
@@ -36,7 +36,7 @@ def make(data: Data) -> Finding:
     """Measure share and consistency of each component, for each set of poses."""
     sets = load_poses(data, n_inside=500 if data.quick else 1500, n_marks=2)
     found = {poses.name: measure(poses, 32 if data.quick else 64) for poses in sets}
-    missing = absent_poses(data)
+    missing = absences(data, sets)
     return Finding(
         " ".join(poses.source for poses in sets),
         (judge(found, missing),),

@@ -147,17 +147,6 @@ def load_poses(data: Data, *, n_inside: int = 1500, n_marks: int = 400) -> list[
     return found or [_creature(data.quick, max(n_inside, n_marks), n_marks, rng)]
 
 
-def absent_poses(data: Data) -> str:
-    """Say which sets of poses are absent and how to get them; empty where none is.
-
-    Examples
-    --------
-    >>> absent_poses(Data()).count("--data")
-    2
-    """
-    return "; ".join(data.absent(name) for name in COLLECTIONS if data.find(name) is None)
-
-
 def absences(data: Data, sets: Sequence[Poses]) -> str:
     """Say which of the real sets are absent, for the note of a claim; nothing where all are there.
 
