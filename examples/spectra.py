@@ -17,9 +17,9 @@ from matplotlib.figure import Figure
 from spem.embedding.signatures import shared_times, shared_values
 from spem.paper.data import Data
 from spem.paper.findings import Claim, Finding, Picture, judged
-from spem.paper.kind_pictures import NAMES, figure_features, figure_scores, table_scores
-from spem.paper.kinds import KindScores, score_kinds, signature_bands
 from spem.paper.present import present
+from spem.paper.spectra import KindScores, score_kinds, signature_bands
+from spem.paper.spectra_pictures import NAMES, figure_features, figure_scores, table_scores
 
 COUNTS = (2, 4, 8)
 # Collection, dimension, voxels of a shape: with more, scores change little.

@@ -7,8 +7,8 @@ import pytest
 
 from spem.paper.catalogue import choose
 from spem.paper.data import Collection, Data
-from spem.paper.kinds import collect_kinds, score_kinds, shared_variance
 from spem.paper.scoring import Features
+from spem.paper.spectra import collect_kinds, score_kinds, shared_variance
 from spem.shapes.creatures import collection
 
 

@@ -1,4 +1,4 @@
-"""Codes of several kinds of features on the same shapes, the signatures from one spectrum."""
+"""Codes of SPEM and of heat and wave signatures on the same shapes, the signatures from one spectrum (3.3)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of kinds of features: on a shape, and what codes of them score."""
+"""Pictures of SPEM beside heat and wave signatures: on a shape, and what codes of them score (3.3)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from spem.paper.kinds import KindScores
+    from spem.paper.spectra import KindScores
     from spem.shapes.shape import Shape
 
 NAMES = {"spem": "SPEM", "hks": "HKS", "si-hks": "SI-HKS", "wks": "WKS"}
