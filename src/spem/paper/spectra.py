@@ -1,4 +1,4 @@
-"""Codes of SPEM and of heat and wave signatures on the same shapes, the signatures from one spectrum (3.3)."""
+"""Codes of SPEM and of heat and wave signatures on the same shapes, these from one spectrum each (3.3)."""
 
 from __future__ import annotations
 
