@@ -90,7 +90,8 @@ def twin_claims(
             note="The profiles differ by no more than their distances.",
         ),
         judged(
-            "Of all profiles, those two are the closer ones, for their comparable distance (2.2).",
+            "The two have closer profiles, for their comparable distance (2.2): the twin's is the one closest to "
+            "the finger's.",
             "closer profiles",
             f"mean difference of the finger's profile from that of its twin {pair.mean():.3f}, from the "
             f"others at least {others.min():.3f}; of all pairs, {closest}",
