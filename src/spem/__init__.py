@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from spem.decomposition.parts import Parts
     from spem.decomposition.sparse_coding import NonnegativeSparseCoding
     from spem.decomposition.transfer import vertex_labels
+    from spem.embedding.correspondence import correspond, match_nodes, surroundings
     from spem.embedding.heat import diffusion_distance, heat_kernel
     from spem.embedding.maps import Maps
     from spem.embedding.nodal import nodal_clusters, nodal_domains, nodal_thresholds
@@ -129,6 +130,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "classify",
     "cluster_interactions",
     "correlation_distance",
+    "correspond",
     "creature_poses",
     "creatures",
     "diffusion_distance",
@@ -149,6 +151,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "killed_walk",
     "level_curvature",
     "maps",
+    "match_nodes",
     "match_parts",
     "nodal_clusters",
     "nodal_domains",
@@ -175,6 +178,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "source_streamlines",
     "source_walk",
     "sources",
+    "surroundings",
     "sweep",
     "synthetic",
     "transform_walk",
@@ -234,6 +238,7 @@ _HOME = {
     "classify": "spem.collections",
     "cluster_interactions": "spem.decomposition.clusters",
     "correlation_distance": "spem.retrieval.distances",
+    "correspond": "spem.embedding.correspondence",
     "creature_poses": "spem.shapes.landmarks",
     "creatures": "spem.shapes.creatures",
     "diffusion_distance": "spem.embedding.heat",
@@ -254,6 +259,7 @@ _HOME = {
     "killed_walk": "spem.fields.walks.killed",
     "level_curvature": "spem.fields.level_curves",
     "maps": "spem.api.fields",
+    "match_nodes": "spem.embedding.correspondence",
     "match_parts": "spem.decomposition.matching",
     "nodal_clusters": "spem.embedding.nodal",
     "nodal_domains": "spem.embedding.nodal",
@@ -280,6 +286,7 @@ _HOME = {
     "source_streamlines": "spem.fields.streamlines",
     "source_walk": "spem.fields.walks.conditioned",
     "sources": "spem.api.parts",
+    "surroundings": "spem.embedding.correspondence",
     "sweep": "spem.api.fields",
     "synthetic": "spem.shapes.synthetic",
     "transform_walk": "spem.fields.walks.conditioned",
