@@ -110,6 +110,44 @@ def test_what_does_not_fit_any_more_is_made_again(items, tmp_path, change):
     assert times_made(item) == 2
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"made": [1]},
+        {"made": {"seconds": "long"}},
+        {"made": {"seconds": None}},
+        {"numbers": 3},
+        {"claims": [{"statement": "1 < 2."}]},
+        {"pictures": [{"file": 5, "caption": ""}]},
+        {"pictures": [{"file": "../second/plain.png", "caption": ""}]},
+    ],
+)
+def test_a_record_of_another_form_is_made_again(items, tmp_path, change):
+    """Valid JSON of the wrong kind, or a picture from elsewhere."""
+    out = tmp_path / "out"
+    run(items, Data(), out)
+    record = out / "first" / RECORD
+    record.write_text(json.dumps(json.loads(record.read_text()) | change))
+    assert load(items[0], out) is None
+    run(items[:1], Data(), out)
+    assert times_made(items[0]) == 2
+
+
+@pytest.mark.parametrize("damage", ["[" * 100_000, "", "[]", "null", "\ud800"])
+def test_a_record_that_is_none_is_made_again(items, tmp_path, damage):
+    """Nested without end, empty, of another kind, or no text at all."""
+    run(items[:1], Data(), tmp_path / "out")
+    (tmp_path / "out" / "first" / RECORD).write_bytes(damage.encode("utf-8", "surrogatepass"))
+    assert load(items[0], tmp_path / "out") is None
+
+
+def test_a_damaged_picture_is_made_again(items, tmp_path):
+    """A report needs all of it."""
+    run(items[:1], Data(), tmp_path / "out")
+    (tmp_path / "out" / "first" / "plain.png").write_bytes(b"")
+    assert load(items[0], tmp_path / "out") is None
+
+
 def test_another_collection_makes_it_again(items, tmp_path):
     """A record made without real shapes is not one made with them."""
     (tmp_path / "shapes" / "tari1000").mkdir(parents=True)

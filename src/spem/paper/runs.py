@@ -15,13 +15,14 @@ from typing import Any
 import spem
 from spem.codes.workers import one_line
 from spem.errors import ParameterError
-from spem.files import write_whole
+from spem.files import DAMAGE, write_whole
 from spem.paper.catalogue import Item
 from spem.paper.data import Data
 from spem.paper.findings import Claim, Finding, Table
 
 RECORD = "finding.json"
 _DPI = 130
+_PNG = b"\x89PNG"
 
 
 @dataclass(frozen=True)
@@ -112,21 +113,11 @@ def load(item: Item, folder: Path) -> Record | None:
     """Read what is on disk of an item; None where there is nothing whole."""
     place = folder / item.name
     try:
-        values = json.loads((place / RECORD).read_text(encoding="utf-8"))
-        record = Record(
-            item.name,
-            item.words[0],
-            place,
-            values["shapes"],
-            tuple(Claim(**claim) for claim in values["claims"]),
-            tuple((entry["file"], entry["caption"]) for entry in values["pictures"]),
-            tuple(_table(entry) for entry in values["tables"]),
-            values["numbers"],
-            values["made"],
-        )
-    except (OSError, ValueError, KeyError, TypeError):
+        record = _record(item, place, json.loads((place / RECORD).read_text(encoding="utf-8")))
+        whole = all(_is_png(place / file) for file, _ in record.pictures)
+    except DAMAGE:
         return None
-    return record if all((place / file).is_file() for file, _ in record.pictures) else None
+    return record if whole else None
 
 
 def load_all(items: Iterable[Item], folder: Path) -> list[Record]:
@@ -135,23 +126,18 @@ def load_all(items: Iterable[Item], folder: Path) -> list[Record]:
 
 
 def _make(item: Item, data: Data, folder: Path) -> Record:
-    """Run one experiment and write it down; the record is the last file written."""
+    """Run one experiment and write it down."""
     start = time.perf_counter()
     try:
         finding = item.make(data)
     except Exception as error:  # noqa: BLE001 - the rest of a long run goes on
         return Record(item.name, item.words[0], folder / item.name, failure=one_line(error))
     made = _origin(item, data) | {"seconds": round(time.perf_counter() - start, 2)}
-    write(item, finding, folder, made)
-    record = load(item, folder)
-    if record is None:
-        msg = f"{folder / item.name}: what was written cannot be read again; write to another folder"
-        raise ParameterError(msg)
-    return record
+    return write(item, finding, folder, made)
 
 
-def write(item: Item, finding: Finding, folder: Path, made: Mapping[str, Any]) -> None:
-    """Write a finding into a folder of its own: pictures, then the record.
+def write(item: Item, finding: Finding, folder: Path, made: Mapping[str, Any]) -> Record:
+    """Write a finding into a folder of its own: pictures, then the record, which is returned.
 
     Raises
     ------
@@ -183,6 +169,7 @@ def write(item: Item, finding: Finding, folder: Path, made: Mapping[str, Any]) -
     }
     text = json.dumps(values, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_whole(place / RECORD, _writer(text.encode("utf-8")))
+    return _record(item, place, values)
 
 
 def plain(values: Any) -> Any:
@@ -204,9 +191,42 @@ def plain(values: Any) -> Any:
     return values if isinstance(values, (bool, int, float, str)) or values is None else str(values)
 
 
+def _record(item: Item, place: Path, values: Mapping[str, Any]) -> Record:
+    """Return a record of what JSON holds.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If something is missing, of another kind, or a picture lies elsewhere.
+    """
+    pictures = tuple((entry["file"], entry["caption"]) for entry in values["pictures"])
+    for file, _ in pictures:
+        if Path(file).name != file:
+            msg = f"{file}: a picture lies beside its record"
+            raise ValueError(msg)
+    made = dict(values["made"])
+    return Record(
+        item.name,
+        item.words[0],
+        place,
+        values["shapes"],
+        tuple(Claim(**claim) for claim in values["claims"]),
+        pictures,
+        tuple(_table(entry) for entry in values["tables"]),
+        dict(values["numbers"]),
+        made | {"seconds": float(made.get("seconds", 0.0))},
+    )
+
+
 def _table(entry: Mapping[str, Any]) -> Table:
     """Return a table as it was before JSON made lists of its tuples."""
     return Table(entry["caption"], tuple(entry["head"]), tuple(tuple(row) for row in entry["rows"]))
+
+
+def _is_png(path: Path) -> bool:
+    """Tell whether a picture is there, by its first bytes."""
+    with path.open("rb") as file:
+        return file.read(len(_PNG)) == _PNG
 
 
 def _writer(content: bytes) -> Callable[[Any], Any]:
