@@ -9,7 +9,8 @@ import time
 
 import pytest
 
-from spem.paper.catalogue import ITEMS
+from spem.paper.catalogue import ITEMS, Item
+from spem.paper.findings import Finding
 
 
 @pytest.fixture(autouse=True)
@@ -89,3 +90,24 @@ def test_an_interrupted_run_says_how_to_go_on(start, tmp_path):
     assert process.returncode == 130
     assert err.strip().splitlines()[-1].startswith("spem: interrupted; what is made is kept in")
     assert (tmp_path / "fig1" / "finding.json").is_file()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_an_interrupt_while_an_object_is_freed_is_not_lost(spem, tmp_path, monkeypatch):
+    """The interpreter drops what is raised there; the run ends after the item."""
+
+    class Freed:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    def make(item, data):
+        Freed()
+        return Finding("none")
+
+    monkeypatch.setattr(Item, "make", make)
+    before = signal.getsignal(signal.SIGINT)
+    result = spem("paper", "fig1", "fig4", "-o", tmp_path)
+    assert result.exit_code == 130
+    assert (tmp_path / "fig1" / "finding.json").is_file()
+    assert not (tmp_path / "fig4").exists()
+    assert signal.getsignal(signal.SIGINT) is before

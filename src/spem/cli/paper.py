@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+import threading
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +14,8 @@ from spem.cli.options import Json
 from spem.cli.output import check_folder, complain, counted, print_json, print_table
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
+    from types import FrameType
 
     from spem.paper.catalogue import Item
     from spem.paper.data import Data
@@ -121,10 +125,32 @@ def _run(items: Sequence[Item], data: Data, output: Path, *, again: bool, quiet:
         for claim in record.claims:
             note = f"; {claim.note}" if claim.note else ""
             typer.echo(f"  {claim.verdict}: {claim.statement} paper: {claim.paper}; ours: {claim.ours}{note}")
+        if interrupts:
+            raise KeyboardInterrupt
 
-    with bar:
+    with bar, _interrupts() as interrupts:
         bar.advance("items", 0, len(items))
         return run(items, data, output, again=again, tell=tell)
+
+
+@contextmanager
+def _interrupts() -> Iterator[list[int]]:
+    """Collect interrupts beside raising them: what is raised while an object is freed is lost."""
+    came: list[int] = []
+    usual = signal.getsignal(signal.SIGINT)
+    if not callable(usual) or threading.current_thread() is not threading.main_thread():
+        yield came
+        return
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        came.append(number)
+        usual(number, frame)
+
+    signal.signal(signal.SIGINT, handle)
+    try:
+        yield came
+    finally:
+        signal.signal(signal.SIGINT, usual)
 
 
 def _finish(records: Sequence[Record], data: Data, output: Path, *, json: bool) -> None:
