@@ -20,7 +20,6 @@ from scipy.spatial.distance import cdist
 import spem
 from spem.paper.data import INNER_RADIUS, Data
 from spem.paper.findings import Claim, Finding, Picture, judged
-from spem.paper.limbs import node_depth
 from spem.paper.present import present
 from spem.paper.silhouettes import chosen
 from spem.plots.figures import figure_fields
@@ -35,7 +34,7 @@ def make(data: Data) -> Finding:
     """Solve for a few ρ on a cat; measure how deep each reaches and from how far."""
     found = chosen(data, "cat")
     cat = found.shapes[0]
-    fields, depth = np.asarray(spem.field(cat, RHO), np.float64), node_depth(cat)
+    fields, depth = np.asarray(spem.field(cat, RHO), np.float64), spem.distance_to_boundary(cat)
     grows = float((np.diff(fields, axis=1) > 0).mean())
     middle = fields[depth >= np.quantile(depth, 0.9)].mean(axis=0)
     half = [float(depth[column > 0.5].max(initial=0.0)) for column in fields.T]

@@ -23,7 +23,6 @@ from spem.fields.hyperfield import Hyperfield
 from spem.paper.data import Data
 from spem.paper.equidistance import distinct_nodes
 from spem.paper.findings import Claim, Finding, Picture, Table, judged
-from spem.paper.limbs import node_depth
 from spem.paper.present import present
 from spem.paper.silhouettes import chosen
 from spem.plots.profiles import draw_profiles
@@ -40,7 +39,7 @@ def make(data: Data) -> Finding:
     """Draw the profiles of five nodes of a hand, and compare two that are equally deep."""
     found = chosen(data, "hand")
     hand = found.shapes[0]
-    nodes, depth = distinct_nodes(hand), node_depth(hand)
+    nodes, depth = distinct_nodes(hand), spem.distance_to_boundary(hand)
     hyperfield = spem.sweep(hand, RHO)
     profiles = hyperfield.fields()[nodes]
     apart = {pair: np.abs(profiles[pair[0]] - profiles[pair[1]]) for pair in combinations(range(5), 2)}
@@ -90,8 +89,8 @@ def twin_claims(
             note="The profiles differ by no more than their distances.",
         ),
         judged(
-            "The two have closer profiles, for their comparable distance (2.2): the twin's is the one closest to "
-            "the finger's.",
+            "The two have closer profiles, for their comparable distance (2.2): of the others, the twin's is "
+            "nearest to the finger's.",
             "closer profiles",
             f"mean difference of the finger's profile from that of its twin {pair.mean():.3f}, from the "
             f"others at least {others.min():.3f}; of all pairs, {closest}",

@@ -24,7 +24,6 @@ import spem
 from spem.paper.data import INNER_RADIUS, Data
 from spem.paper.equidistance import BAND, band, spread_along_curve, spread_ratios
 from spem.paper.findings import Finding, Picture, Table, judged
-from spem.paper.limbs import node_depth
 from spem.paper.present import present
 from spem.paper.silhouettes import chosen
 from spem.plots.fields import draw_outline
@@ -93,7 +92,7 @@ def figure_spread(hand: spem.Shape, fields: Array, ratio: Array, control: Array)
     """Draw nodes of one depth, their profiles and the ratio over ρ."""
     figure = new_figure(9.0, 3.0)
     place, curves, right = figure.subplots(1, 3, width_ratios=(1, 1.3, 1.3))
-    nodes = np.flatnonzero(band(node_depth(hand), SHOWN))
+    nodes = np.flatnonzero(band(spem.distance_to_boundary(hand), SHOWN))
     order = nodes[np.argsort(fields[nodes, RHO.size // 4])]
     draw_outline(hand, place)
     bare(place, f"nodes {SHOWN} pixels deep")

@@ -7,7 +7,7 @@ import pytest
 
 from spem.errors import ParameterError
 from spem.paper.data import Data
-from spem.paper.limbs import core_labels, find_limbs, fingers, legs_and_tail, main_labels, node_depth
+from spem.paper.limbs import core_labels, find_limbs, fingers, legs_and_tail, main_labels
 from spem.paper.silhouettes import chosen
 from spem.shapes.shape import Shape
 from spem.shapes.synthetic import disk
@@ -62,14 +62,6 @@ def test_labels_of_limbs_and_of_the_core():
     labels = np.where(limbs.core, 7, limbs.inside.argmax(axis=0))
     assert main_labels(labels, limbs.inside) == [0, 1, 2, 3, 4]
     assert core_labels(labels, limbs) == [7]
-
-
-def test_depth_is_that_below_the_surface():
-    """Of a disk the radius less the distance from its middle."""
-    shape = disk(20.0, 1.0)
-    depth = node_depth(shape)
-    radius = np.linalg.norm(shape.points, axis=1)
-    assert np.abs(depth - (20 - radius)).max() < 0.1
 
 
 @pytest.mark.parametrize("kind", ["hand", "cat"])

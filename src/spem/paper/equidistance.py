@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import distance_transform_edt
 
+from spem.fields.boundary_distance import distance_to_boundary
 from spem.fields.isocontours import iso_contours
-from spem.paper.limbs import fingers, node_depth
+from spem.paper.limbs import fingers
 from spem.shapes.shape import Shape
 
 # Half the width of a band of depth, in pixels; and of the wider one that the fall of v is taken from.
@@ -55,7 +56,7 @@ def spread_ratios(shape: Shape, fields: Array, at: float) -> dict[str, Array]:
     """
     found = {}
     transform = distance_transform_edt(shape.mask)[shape.mask]
-    for kind, depth in (("sub-voxel", node_depth(shape)), ("pixel", transform)):
+    for kind, depth in (("sub-voxel", distance_to_boundary(shape)), ("pixel", transform)):
         near = np.abs(depth - at) <= FALL
         fall = np.polyfit(depth[near], fields[near], 1)[0]
         mine = band(depth, at)
@@ -73,7 +74,7 @@ def spread_along_curve(shape: Shape, fields: Array, at: float) -> Array:
     shape, fields, at
         As for `spread_ratios`.
     """
-    lines = np.vstack(iso_contours(shape, node_depth(shape), [at])[0])
+    lines = np.vstack(iso_contours(shape, distance_to_boundary(shape), [at])[0])
     values = RegularGridInterpolator(shape.axes, shape.to_grid(fields, 1.0))(lines)
     return np.asarray(values.std(axis=0))
 
@@ -95,7 +96,7 @@ def distinct_nodes(hand: Shape) -> NDArray[np.int64]:
     ParameterError
         If it has fewer.
     """
-    found, depth, points = fingers(hand), node_depth(hand), hand.points
+    found, depth, points = fingers(hand), distance_to_boundary(hand), hand.points
     lengths = [found.length(finger) for finger in range(len(found.inside))]
     longest = int(np.argmax(lengths))
     away = np.linalg.norm(points - points[found.tip(longest)], axis=1) / lengths[longest]

@@ -6,18 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from spem.errors import ParameterError
 from spem.fields.boundary.sources import Sources, point_sources
+from spem.fields.boundary_distance import distance_to_boundary
 from spem.fields.operator import assemble
 from spem.paper.perturbations import limbs
 from spem.shapes.shape import Shape
 
 # Fingers of a hand; legs and tail of an animal.
 CHAIN = 5
-# Between points of an outline that distances are measured from, in voxels.
-STEP = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +130,7 @@ def fingers(shape: Shape) -> Limbs:
         If there are fewer than five limbs.
     """
     found = find_limbs(shape)
-    depth = node_depth(shape)
+    depth = distance_to_boundary(shape)
     chain = _chain(found, np.array([depth[limb].max() for limb in found.inside]))
     gaps = np.diff(chain.places) % 1
     return chain if gaps[-1] > gaps[0] else Limbs(shape, chain.inside[::-1], chain.places[::-1])
@@ -148,25 +146,6 @@ def legs_and_tail(shape: Shape) -> Limbs:
     """
     found = find_limbs(shape)
     return _chain(found, -found.inside.sum(axis=1))
-
-
-def node_depth(shape: Shape) -> NDArray[np.float64]:
-    """Return the distance of each node of a silhouette to its outline, drawn from cut to cut.
-
-    Examples
-    --------
-    >>> node_depth(Shape.from_mask(np.ones((3, 9)))).reshape(3, 9)[:, 4].round(2).tolist()
-    [0.5, 1.5, 0.5]
-    """
-    points = point_sources(assemble(shape, "surface"))
-    pieces = []
-    for contour in np.unique(points.contour):
-        line = points.position[points.contour == contour]
-        line = np.vstack([line, line[:1]])
-        way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-        at = np.arange(0.0, way[-1], STEP * min(shape.spacing))
-        pieces.append(np.column_stack([np.interp(at, way, column) for column in line.T]))
-    return np.asarray(KDTree(np.vstack(pieces)).query(shape.points)[0])
 
 
 def _chain(found: Limbs, rank: NDArray[np.floating | np.integer]) -> Limbs:
