@@ -29,7 +29,6 @@ from spem.paper.perturbations import limbs
 from spem.paper.present import present
 from spem.paper.regions import roughness, separation, separation_at_depth
 from spem.plots.map_grid import figure_map_grid
-from spem.shapes.distance import signed_distance
 
 N_MAPS = 5
 
@@ -62,7 +61,7 @@ def make(data: Data) -> Finding:
 def character(maps: spem.Maps) -> dict[str, Any]:
     """Measure what the maps of one cat mark."""
     mask, values = maps.shape.mask, maps.values
-    depth, limb = signed_distance(maps.shape)[mask], np.any(limbs(mask), axis=0)[mask]
+    depth, limb = spem.distance_to_boundary(maps.shape), np.any(limbs(mask), axis=0)[mask]
     return {
         "rank_correlation_p1_depth": float(spearmanr(values[:, 0], depth).statistic),
         "p1_positive": float((values[:, 0] > 0).mean()),
