@@ -12,6 +12,7 @@ import spem
 from spem.errors import ParameterError
 from spem.fields.boundary.sources import point_sources
 from spem.fields.operator import assemble
+from spem.fields.walks.conditioned import arriving_walk, transform_walk
 from spem.fields.walks.estimate import estimate_field, estimate_sources, sample_discounts
 from spem.fields.walks.intervals import Estimate
 from spem.fields.walks.killed import Walk, killed_walk
@@ -21,6 +22,7 @@ from spem.fields.walks.lifetimes import (
     expected_steps,
     expected_time,
 )
+from spem.fields.walks.paths import sample_paths
 from spem.fields.walks.steps import step_table, streams, uniform
 from spem.shapes.shape import Cuts, Shape
 from spem.shapes.synthetic import ball, disk, interval, n_ball
@@ -224,6 +226,81 @@ def test_wrong_arguments_are_refused():
         Walk(walk.system, 1.0, np.full(9, np.nan), np.zeros(12))
     with pytest.raises(ParameterError, match="grows by more than 1e308"):
         Walk(walk.system, 1.0, np.linspace(0, 9000, 9), np.zeros(12))
+
+
+@pytest.mark.parametrize("rho", [1e160, 1e300])
+def test_a_huge_rho_is_infinite(rho):
+    """Its square is more than a float64 holds."""
+    shape = Shape.from_mask(np.ones((2, 3)))
+    walk, free = killed_walk(shape, rho), killed_walk(shape, np.inf)
+    np.testing.assert_allclose(walk.killing, 0, atol=1e-300)
+    np.testing.assert_allclose(expected_steps(walk), expected_steps(free))
+
+
+def test_a_tiny_rho_is_refused():
+    """In units of the spacing; its inverse square may be more than a float64 holds."""
+    shape = Shape.from_mask(np.ones((2, 3)), spacing=1e-9)
+    assert killed_walk(shape, 1e-14).killing.min() > 0.99
+    for rho in (1e-16, 1e-160):
+        with pytest.raises(ParameterError, match="below 1e-06 of the spacing 1e-09"):
+            killed_walk(shape, rho)
+
+
+def test_transformed_walks_have_no_discount_and_are_transformed_no_more():
+    """Their chances would be those of another walk."""
+    walk = arriving_walk(killed_walk(Shape.from_mask(np.ones(3)), 1.0))
+    assert not walk.plain
+    with pytest.raises(ParameterError, match="this walk is transformed already"):
+        arriving_walk(walk)
+    with pytest.raises(ParameterError, match="this walk is transformed already"):
+        sample_discounts(walk, nodes=[0], n_walks=2, rng=np.random.default_rng(0))
+
+
+def test_sources_of_the_other_boundary_are_refused():
+    """Though the shape is the same, and has as many boundary edges."""
+    shape = Shape.from_mask(np.ones(3))
+    with pytest.raises(ParameterError, match="make both of one system"):
+        arrival_probabilities(killed_walk(shape, 1.0), spem.sources(shape, boundary="voxel"))
+
+
+@pytest.mark.parametrize("node", [1.5, True, [0, 1], [], 3, -1, None, "0"])
+def test_paths_start_at_one_node(node):
+    """Neither at a fraction, nor at several."""
+    walk = killed_walk(Shape.from_mask(np.ones(3)), 1.0)
+    with pytest.raises(ParameterError, match=r"nodes are whole numbers from 0 to 2|expected one node"):
+        sample_paths(walk, node, 1, np.random.default_rng(0))
+    with pytest.raises(ParameterError, match=r"nodes are whole numbers from 0 to 2|expected one node"):
+        arrival_by_step(walk, node, 1)
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.5, True, None, [2]])
+def test_numbers_of_walks_and_steps_are_whole(count):
+    """One at least."""
+    walk, rng = killed_walk(Shape.from_mask(np.ones(3)), 1.0), np.random.default_rng(0)
+    with pytest.raises(ParameterError, match="expected a whole number of at least 1"):
+        sample_paths(walk, 0, count, rng)
+    with pytest.raises(ParameterError, match="expected a whole number of at least 1"):
+        arrival_by_step(walk, 0, count)
+    with pytest.raises(ParameterError, match="expected a whole number of at least 1"):
+        estimate_field(walk, nodes=[0], n_walks=count, rng=rng)
+
+
+@pytest.mark.parametrize("comparisons", [np.nan, np.inf, 0])
+def test_comparisons_are_a_number(comparisons):
+    """Otherwise intervals would be empty, or everything."""
+    with pytest.raises(ParameterError, match="comparisons="):
+        Estimate(np.array([0]), 9, np.array([3]), np.ones(1), comparisons=comparisons)
+
+
+def test_h_that_is_wrong_is_refused():
+    """One value too many on the boundary, or none that is positive."""
+    walk = killed_walk(Shape.from_mask(np.ones(3)), 1.0)
+    with pytest.raises(ParameterError, match=r"on the boundary must be one number or \(2,\), not \(3,\)"):
+        transform_walk(walk, np.zeros(3), np.zeros(3))
+    with pytest.raises(ParameterError, match="h is zero everywhere"):
+        expected_steps(transform_walk(walk, np.full(3, -np.inf)))
+    with pytest.raises(ParameterError, match="expected Walk, got Shape"):
+        arriving_walk(walk.system.shape)
 
 
 @pytest.mark.data

@@ -12,7 +12,7 @@ from spem.errors import ParameterError
 from spem.fields.boundary.points import boundary_points
 from spem.fields.boundary.sources import Sources, check_source
 from spem.fields.superposition.fields import SourceFields, require_fields, solve_sources
-from spem.fields.walks.killed import Walk, killed_walk
+from spem.fields.walks.killed import Walk, killed_walk, require_plain, require_walk
 
 # Dense kernels: eigenvectors of more nodes than this take minutes.
 _MOST_NODES = 4000
@@ -47,10 +47,14 @@ def transform_walk(walk: Walk, log_h: ArrayLike, log_boundary: ArrayLike = 0.0) 
     >>> bool(np.allclose(transform_walk(walk, np.log(spem.field(line, 1.0))).killing, 0, atol=1e-12))
     True
     """
-    edges = np.broadcast_to(np.asarray(log_boundary, np.float64), walk.log_boundary.shape)
-    nodes = np.asarray(log_h, np.float64)
+    require_walk(walk)
+    name, n_edges = walk.system.shape.name, walk.log_boundary.size
+    nodes, edges = np.asarray(log_h, np.float64), np.asarray(log_boundary, np.float64)
     if nodes.shape != walk.log_h.shape:
-        msg = f"{walk.system.shape.name}: log h must be ({walk.n_nodes},), one a node, not {nodes.shape}"
+        msg = f"{name}: log h must be ({walk.n_nodes},), one a node, not {nodes.shape}"
+        raise ParameterError(msg)
+    if edges.shape not in ((), (n_edges,)):
+        msg = f"{name}: log h on the boundary must be one number or ({n_edges},), not {edges.shape}"
         raise ParameterError(msg)
     return replace(walk, log_h=walk.log_h + nodes, log_boundary=walk.log_boundary + edges)
 
@@ -63,6 +67,11 @@ def arriving_walk(walk: Walk) -> Walk:
     walk
         A walk as `killed_walk` makes it.
 
+    Raises
+    ------
+    ParameterError
+        When it is transformed already, or ρ is below a hundredth of the spacing.
+
     Examples
     --------
     >>> from spem.shapes.shape import Shape
@@ -71,6 +80,7 @@ def arriving_walk(walk: Walk) -> Walk:
            [0.5       , 0.5       ],
            [0.22222222, 0.77777778]])
     """
+    require_plain(walk)
     points = boundary_points(walk.system)
     whole = Sources(walk.system, points, np.zeros(points.n_points, np.int32))
     return transform_walk(walk, solve_sources(whole, walk.rho).log[0])

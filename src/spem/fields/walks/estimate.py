@@ -10,7 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from spem.errors import ParameterError
 from spem.fields.boundary.sources import Sources
 from spem.fields.walks.intervals import LEVEL, Estimate
-from spem.fields.walks.killed import Walk, killed_walk, require_nodes, require_same_edges
+from spem.fields.walks.killed import (
+    Walk,
+    killed_walk,
+    require_count,
+    require_nodes,
+    require_plain,
+    require_same_edges,
+)
 from spem.fields.walks.steps import count_ends, discount, step_table, streams
 
 
@@ -130,7 +137,7 @@ def sample_discounts(
     Raises
     ------
     ParameterError
-        When a node does not exist or an argument is out of its range.
+        When a node does not exist, an argument is out of its range, or the walk is transformed.
 
     Examples
     --------
@@ -139,8 +146,9 @@ def sample_discounts(
     >>> sample_discounts(walk, nodes=[0], n_walks=3, rng=np.random.default_rng(0)).round(3)
     array([[0.667, 0.667, 0.667]])
     """
+    require_plain(walk)
     starts, free = require_nodes(walk, nodes), killed_walk(walk.system, np.inf)
-    _check_count(n_walks)
+    require_count("n_walks", n_walks)
     target = targets(walk, np.zeros(walk.log_boundary.size, np.int64))
     table, survival = step_table(free), 1 - walk.killing
     states, result = streams(starts.size, rng), np.empty((starts.size, n_walks))
@@ -175,17 +183,10 @@ def _count(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """Nodes, ``(n, n_groups)`` number of walks that end in each group, and mean number of steps."""
     starts = require_nodes(walk, nodes)
-    _check_count(n_walks)
+    require_count("n_walks", n_walks)
     table, target, states = step_table(walk), targets(walk, group), streams(starts.size, rng)
     counts = np.zeros((starts.size, int(group.max(initial=0)) + 1), np.int64)
     steps = [
         count_ends(int(node), n_walks, states[i], table, target, counts[i]) for i, node in enumerate(starts)
     ]
     return starts, counts, np.asarray(steps) / n_walks
-
-
-def _check_count(n_walks: int) -> None:
-    """Refuse a number of walks that is no positive whole number."""
-    if np.asarray(n_walks).dtype.kind not in "iu" or n_walks < 1:
-        msg = f"n_walks={n_walks!r}: expected a whole number of at least 1"
-        raise ParameterError(msg)

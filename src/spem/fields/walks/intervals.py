@@ -54,8 +54,8 @@ class Estimate:
         if not 0 < self.level < 1:
             msg = f"level={self.level!r}: expected a chance between 0 and 1, such as 0.99"
             raise ParameterError(msg)
-        if self.comparisons < 1:
-            msg = f"comparisons={self.comparisons!r}: expected at least 1"
+        if not (self.comparisons >= 1 and self._tail > 0):
+            msg = f"comparisons={self.comparisons!r}: expected at least 1, and finite"
             raise ParameterError(msg)
 
     @property

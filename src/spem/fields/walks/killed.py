@@ -15,6 +15,9 @@ from spem.fields.operator import Boundary, System, assemble
 from spem.fields.rho import single_rho
 from spem.shapes.shape import Shape
 
+# Below this share of the spacing every walk is killed at its first step, and 1/ρ² may overflow.
+_LEAST_RHO = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Walk:
@@ -68,10 +71,20 @@ class Walk:
         """Number of nodes."""
         return self.system.n_nodes
 
+    @property
+    def plain(self) -> bool:
+        """Whether h = 1, as `killed_walk` makes it."""
+        return not self.log_h.any() and not self.log_boundary.any()
+
+    @property
+    def shift(self) -> float:
+        """1/ρ², zero for ρ = `inf`."""
+        return float((1 / np.float64(self.rho)) ** 2)
+
     @cached_property
     def rate(self) -> NDArray[np.float64]:
         """``(n_nodes,)`` diagonal of A + M/ρ²: conductances of all edges of a node, and its killing rate."""
-        return np.asarray(self.system.diagonal + self.system.mass / self.rho**2)
+        return np.asarray(self.system.diagonal + self.system.mass * self.shift)
 
     @cached_property
     def probability(self) -> NDArray[np.float64]:
@@ -88,7 +101,7 @@ class Walk:
         It is zero, and the walk conservative, exactly where h solves (A + M/ρ²) h = b with its own boundary
         values; negative where h is no upper solution, so that there is no such walk. It is 1 where h is zero.
         """
-        screening = self.system.mass / self.rho**2 / self.rate
+        screening = self.system.mass * self.shift / self.rate
         killing = screening - (self._plain * np.expm1(self._rise)).sum(axis=1)
         return np.asarray(np.where(self.log_h == -np.inf, 1.0, killing))
 
@@ -131,7 +144,7 @@ class Walk:
         return np.where(self.log_h[:, None] == -np.inf, -np.inf, ends - start)
 
     def __repr__(self) -> str:
-        kind = "as it is" if not self.log_h.any() and not self.log_boundary.any() else "transformed"
+        kind = "as it is" if self.plain else "transformed"
         return f"Walk({self.system.shape.name!r}, {self.n_nodes} nodes, rho {self.rho:.4g}, {kind})"
 
 
@@ -154,7 +167,7 @@ def killed_walk(place: Shape | System, rho: float, *, boundary: Boundary = "surf
     Raises
     ------
     ParameterError
-        When ρ is not one positive number, or there is no shape.
+        When ρ is not one positive number or far below the spacing, or there is no shape.
 
     Examples
     --------
@@ -170,8 +183,19 @@ def killed_walk(place: Shape | System, rho: float, *, boundary: Boundary = "surf
     else:
         require_kind(place, Shape, "read it first: spem.read(...)")
         system = assemble(place, boundary)
-    nodes, edges = np.zeros(system.n_nodes), np.zeros(system.domain.fraction.size)
-    return Walk(system, single_rho(rho), nodes, edges)
+    length, unit = single_rho(rho), min(system.shape.spacing)
+    if length < _LEAST_RHO * unit:
+        msg = (
+            f"{system.shape.name}: rho={length:g} is below {_LEAST_RHO:g} of the spacing {unit:g}, where "
+            "every walk is killed at once; use a larger rho or a finer spacing"
+        )
+        raise ParameterError(msg)
+    return Walk(system, length, np.zeros(system.n_nodes), np.zeros(system.domain.fraction.size))
+
+
+def require_walk(walk: object) -> None:
+    """Refuse anything but a walk."""
+    require_kind(walk, Walk, "make it: spem.killed_walk(shape, rho)")
 
 
 def require_nodes(walk: Walk, nodes: object) -> NDArray[np.int64]:
@@ -187,6 +211,7 @@ def require_nodes(walk: Walk, nodes: object) -> NDArray[np.int64]:
     >>> require_nodes(killed_walk(Shape.from_mask(np.ones(3)), 1.0), 2)
     array([2])
     """
+    require_walk(walk)
     numbers = np.atleast_1d(np.asarray(nodes))
     whole = numbers.ndim == 1 and numbers.size and numbers.dtype.kind in "iu"
     if not whole or numbers.min() < 0 or numbers.max() >= walk.n_nodes:
@@ -195,10 +220,39 @@ def require_nodes(walk: Walk, nodes: object) -> NDArray[np.int64]:
     return numbers.astype(np.int64)
 
 
+def require_node(walk: Walk, node: object) -> int:
+    """Return the number of one node, as `require_nodes` does."""
+    numbers = require_nodes(walk, node)
+    if numbers.size != 1:
+        msg = f"{walk.system.shape.name}: expected one node, got {node!r}"
+        raise ParameterError(msg)
+    return int(numbers[0])
+
+
+def require_plain(walk: Walk) -> None:
+    """Refuse a walk that was transformed."""
+    require_walk(walk)
+    if not walk.plain:
+        msg = f"{walk.system.shape.name}: this walk is transformed already; give it as killed_walk makes it"
+        raise ParameterError(msg)
+
+
+def require_count(name: str, value: object) -> None:
+    """Refuse a number that is no positive whole number."""
+    if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < 1:
+        msg = f"{name}={value!r}: expected a whole number of at least 1"
+        raise ParameterError(msg)
+
+
 def require_same_edges(walk: Walk, sources: Sources) -> None:
     """Refuse sources on the boundary of another system."""
-    if sources.edge_source.shape != walk.log_boundary.shape or sources.system.shape is not walk.system.shape:
+    require_kind(sources, Sources, "make them: spem.sources(shape)")
+    require_walk(walk)
+    mine = walk.system
+    if sources.system.shape is not mine.shape or sources.system.boundary != mine.boundary:
         what = f"{sources.system.shape.name!r}, {sources.system.boundary}"
-        mine = f"{walk.system.shape.name!r}, {walk.system.boundary}"
-        msg = f"the sources are of {what}, the walk is on {mine}; make both of one system"
+        msg = (
+            f"the sources are of {what}, the walk is on {mine.shape.name!r}, {mine.boundary}; "
+            "make both of one system"
+        )
         raise ParameterError(msg)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from spem.errors import ParameterError
 from spem.fields.boundary.sources import Sources
 from spem.fields.solvers.direct import Direct
-from spem.fields.walks.killed import Walk, require_nodes, require_same_edges
+from spem.fields.walks.killed import Walk, require_count, require_node, require_same_edges, require_walk
 
 # Natural logarithms that a float64 still holds, with room for what they are multiplied by.
 _DEEPEST = 600.0
@@ -42,6 +42,7 @@ def expected_steps(walk: Walk) -> NDArray[np.float64]:
     >>> expected_steps(killed_walk(Shape.from_mask(np.ones(3)), np.inf, boundary="voxel")).round(6)
     array([3., 4., 3.])
     """
+    require_walk(walk)
     return _lifetime(walk, walk.rate)
 
 
@@ -74,6 +75,7 @@ def expected_time(walk: Walk) -> NDArray[np.float64]:
     >>> round(float(time.max()), 2)  # (length / 2)² / 2
     8.0
     """
+    require_walk(walk)
     return _lifetime(walk, walk.system.mass)
 
 
@@ -113,7 +115,7 @@ def arrival_probabilities(walk: Walk, sources: Sources) -> NDArray[np.float64]:
     rhs = np.zeros((walk.n_nodes, sources.n_sources))
     used = sources.edge_source >= 0
     np.add.at(rhs, (node[used], sources.edge_source[used]), (walk.edge_arrival * (walk.rate * h)[node])[used])
-    solution = Direct().prepare(walk.system, walk.rho**-2.0).solve(rhs)
+    solution = Direct().prepare(walk.system, walk.shift).solve(rhs)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray((solution / h[:, None]).T)
 
@@ -141,7 +143,7 @@ def arrival_by_step(walk: Walk, node: int, n_steps: int) -> NDArray[np.float64]:
     Raises
     ------
     ParameterError
-        When there is no such node.
+        When there is no such node, or the number is no whole one.
 
     Examples
     --------
@@ -151,9 +153,10 @@ def arrival_by_step(walk: Walk, node: int, n_steps: int) -> NDArray[np.float64]:
     >>> arrival_by_step(walk, 1, 4)
     array([0. , 0.5 , 0. , 0.25])
     """
-    require_nodes(walk, node)
+    start = require_node(walk, node)
+    require_count("n_steps", n_steps)
     place = np.zeros(walk.n_nodes)
-    place[node] = 1.0
+    place[start] = 1.0
     backward = walk.transition.T.tocsr()
     result = np.empty(n_steps)
     for step in range(n_steps):
@@ -164,7 +167,7 @@ def arrival_by_step(walk: Walk, node: int, n_steps: int) -> NDArray[np.float64]:
 
 def _lifetime(walk: Walk, each: NDArray[np.float64]) -> NDArray[np.float64]:
     """Sum of what each visit to a node counts, over a walk from each node: (1/h) (A + M/ρ²)⁻¹ (each · h)."""
-    factor, (reached, h) = Direct().prepare(walk.system, walk.rho**-2.0), _scaled(walk)
+    factor, (reached, h) = Direct().prepare(walk.system, walk.shift), _scaled(walk)
     total = factor.solve(each * h)
     return np.asarray(np.divide(total, h, out=np.full(walk.n_nodes, np.nan), where=reached))
 
@@ -172,6 +175,9 @@ def _lifetime(walk: Walk, each: NDArray[np.float64]) -> NDArray[np.float64]:
 def _scaled(walk: Walk) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Where h is positive, and h in units of its largest value."""
     reached = walk.log_h > -np.inf
+    if not reached.any():
+        msg = f"{walk.system.shape.name}: h is zero everywhere, so there is no walk"
+        raise ParameterError(msg)
     log = walk.log_h - walk.log_h[reached].max()
     if log[reached].min() < -_DEEPEST:
         msg = (

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from spem.errors import ParameterError
 from spem.fields.walks.estimate import targets
-from spem.fields.walks.killed import Walk, require_nodes
+from spem.fields.walks.killed import Walk, require_count, require_node
 from spem.fields.walks.steps import step_table, streams, trace
 
 
@@ -69,13 +69,14 @@ def sample_paths(walk: Walk, node: int, n_paths: int, rng: np.random.Generator) 
     >>> path.arrived, path.points[0].tolist(), abs(path.points[-1] - 4).tolist()
     (True, [4.0], [4.5])
     """
-    (start,) = require_nodes(walk, int(node))
+    start = require_node(walk, node)
+    require_count("n_paths", n_paths)
     if walk.log_h[start] == -np.inf:
         msg = f"{walk.system.shape.name}: no walk from node {start}: the source does not reach it"
         raise ParameterError(msg)
     table, target = step_table(walk), targets(walk, np.zeros(walk.log_boundary.size, np.int64))
     states = streams(n_paths, rng)
-    return [_path(walk, *trace(int(start), state, table, target)) for state in states]
+    return [_path(walk, *trace(start, state, table, target)) for state in states]
 
 
 def _path(walk: Walk, nodes: NDArray[np.int64], edge: int) -> Path:

@@ -117,12 +117,12 @@ def solve_transient(
     """
     walk = killed_walk(place, rho, boundary=boundary)
     moments, system = _checked_times(times), walk.system
-    steady = Direct().prepare(system, walk.rho**-2.0).solve(system.rhs)
+    steady = Direct().prepare(system, walk.shift).solve(system.rhs)
     deviation = _checked_start(start, system) - steady
     tolerance, error, n_solves = rtol * float(np.abs(deviation).max()), 0.0, 0
     values = np.repeat(steady[:, None], moments.size, axis=1)
     if np.abs(deviation).max() > _ROUNDING and np.any(moments > 0):
-        space = _Space(system, walk.rho, deviation)
+        space = _Space(system, walk.shift, deviation)
         change, error = space.follow(moments, tolerance, max_solves)
         values, n_solves = values + change, space.n_solves
     values[:, moments == 0] = (steady + deviation)[:, None] if np.ndim(start) else np.asarray(start)
@@ -171,7 +171,7 @@ def decay_rate(place: Shape | System, rho: float, *, boundary: Boundary = "surfa
     if n == 1:
         return float((walk.rate / system.mass)[0])
     root = np.sqrt(system.mass)
-    factor = Direct().prepare(system, walk.rho**-2.0)
+    factor = Direct().prepare(system, walk.shift)
     inverse = LinearOperator((n, n), matvec=lambda x: root * factor.solve(root * x.ravel()), dtype=np.float64)
     largest = eigsh(inverse, k=1, v0=root, return_eigenvectors=False)
     return float(1 / largest[0])
@@ -180,8 +180,8 @@ def decay_rate(place: Shape | System, rho: float, *, boundary: Boundary = "surfa
 class _Space:
     """Rational Krylov space of M⁻¹(A + M/ρ²) from one vector, orthonormal in the inner product of M."""
 
-    def __init__(self, system: System, rho: float, start: NDArray[np.float64]) -> None:
-        self.system, self.shift = system, rho**-2.0
+    def __init__(self, system: System, shift: float, start: NDArray[np.float64]) -> None:
+        self.system, self.shift = system, shift
         self.matrix = system.matrix(self.shift)
         self.length = float(np.sqrt(start @ (system.mass * start)))
         self.basis = (start / self.length)[:, None]
