@@ -85,8 +85,8 @@ def claims(middle: NDArray[np.float64], spread: NDArray[np.float64]) -> tuple[Cl
             f"within {100 * middle.max():.0f} % of the distance of the outer means, for projections 2 to 9; "
             f"within {100 * NEAR:.0f} % for {near} of {len(middle)}",
             bool((middle < NEAR).all()),
-            note="A projection that is strong in a small part has its middle cluster off zero, where its many "
-            "weak nodes are.",
+            note="A projection that is strong in a small part has its middle cluster off zero, where its "
+            "many weak nodes are.",
         ),
         judged(
             "Clustered shape by shape, the cluster centres are very similar (5.4).",

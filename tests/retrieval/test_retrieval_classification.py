@@ -7,7 +7,7 @@ import pytest
 from sklearn.neighbors import KNeighborsClassifier
 
 from spem.errors import LabelError, ParameterError
-from spem.retrieval.classification import Classification, classify_vectors, split
+from spem.retrieval.classification import Classification, classify_vectors, linear_svm, split
 
 LABELS = ["cat"] * 6 + ["dog"] * 8 + ["cow"] * 5
 
@@ -76,6 +76,15 @@ def test_scale_of_entries_does_not_count():
     plain = classify_vectors(vectors, LABELS, n_train=3)
     scaled = classify_vectors(vectors * [1.0, 100.0, 0.01] + 3.0, LABELS, n_train=3)
     assert np.array_equal(plain.confusion, scaled.confusion)
+
+
+def test_blocks_weigh_the_same_however_long():
+    """A code that knows the class is heard beside a hundred times longer one that does not."""
+    noise = np.random.default_rng(2).standard_normal((len(LABELS), 300))
+    vectors = np.hstack([noise, apart()])
+    plain = classify_vectors(vectors, LABELS, n_train=3)
+    blocks = classify_vectors(vectors, LABELS, n_train=3, classifier=linear_svm((300, 3)))
+    assert blocks.mean > 90 > plain.mean
 
 
 def test_one_split_has_no_deviation():

@@ -163,12 +163,16 @@ def _moments(points: NDArray[np.float64], weights: NDArray[np.float64], cell: fl
     for part, weight in zip(found, weights.T, strict=True):
         inside = np.flatnonzero(weight)
         if inside.size:
-            mass = weight[inside] * cell
-            offset = points[inside] - mass @ points[inside] / mass.sum()
-            powers = offset[:, :, None] ** np.arange(_ORDER + 1)  # (n_nodes, axis, power)
-            central = (powers[:, 0] * mass[:, None]).T @ powers[:, 1]
-            part[:] = moments_hu(moments_normalized(central, _ORDER))
+            mass, place = weight[inside] * cell, points[inside]
+            x, y = (_powers(axis - mass @ axis / mass.sum()) for axis in place.T)
+            part[:] = moments_hu(moments_normalized(x * mass @ y.T, _ORDER))
     return found
+
+
+def _powers(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the powers of values from 0 to 3, a row each."""
+    square = values * values
+    return np.stack([np.ones_like(values), values, square, square * values])
 
 
 def _plane_points(shape: Shape) -> NDArray[np.float64]:

@@ -129,22 +129,39 @@ def classify_vectors(
     return Classification(classes, np.array(accuracies), confusion, errors, n_train)
 
 
-def linear_svm(penalty: float = 1.0) -> Any:
+def linear_svm(blocks: Sequence[int] = (), *, penalty: float = 10.0) -> Any:
     """Return a linear support vector machine on standardised entries, one class against one.
 
     Where vectors have more entries than there are training shapes, as codes have, these are told apart
-    without an error, and any `penalty` of 0.01 or more gives the same machine.
+    without an error, and a larger `penalty` gives the same machine.
+
+    Parameters
+    ----------
+    blocks
+        Lengths of the kinds of codes that vectors are made of, one beside the other. Each is brought to unit
+        length once its entries are standardised, so that a long kind of code weighs no more than a short one.
+    penalty
+        What an error in training costs.
 
     Examples
     --------
     >>> linear_svm().fit([[0.0], [1.0], [4.0], [5.0]], [0, 0, 1, 1]).predict([[0.5], [4.5]])
     array([0, 1])
+    >>> vectors = [[0.0, 1.0, 3.0], [1.0, 0.0, 2.5], [4.0, 5.0, 0.0], [5.0, 4.0, 0.5]]
+    >>> linear_svm(blocks=(2, 1)).fit(vectors, [0, 0, 1, 1]).predict(vectors)
+    array([0, 0, 1, 1])
     """
+    from sklearn.compose import ColumnTransformer
     from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
+    from sklearn.preprocessing import Normalizer, StandardScaler
     from sklearn.svm import SVC
 
-    return make_pipeline(StandardScaler(), SVC(kernel="linear", C=penalty))
+    machine = SVC(kernel="linear", C=penalty)
+    if not blocks:
+        return make_pipeline(StandardScaler(), machine)
+    ends = np.cumsum([0, *blocks]).tolist()
+    parts = [(f"block {i}", Normalizer(), slice(*ends[i : i + 2])) for i in range(len(blocks))]
+    return make_pipeline(StandardScaler(), ColumnTransformer(parts), machine)
 
 
 def split(
