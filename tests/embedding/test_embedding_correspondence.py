@@ -111,5 +111,13 @@ def test_what_does_not_fit_is_refused(hand):
         correspond(maps, maps, lengths=[0.1, 0.0])
     with pytest.raises(ParameterError, match="one row a node"):
         surroundings(hand, np.ones(3))
+    with pytest.raises(ParameterError, match="expected finite numbers at all nodes"):
+        surroundings(Shape.from_mask(np.ones(4)), [0.0, np.nan, 0.0, 1.0])
+    assert surroundings(Shape.from_mask(np.ones(4)), [0.0, 0.0, 0.0, 1.0], np.array([0.1, 0.3])).shape == (
+        4,
+        2,
+    )
+    with pytest.raises(ParameterError, match=r"\(3, 0\) and \(2, 0\): expected"):
+        match_nodes(np.zeros((3, 0)), np.zeros((2, 0)))
     with pytest.raises(ParameterError, match="hold NaN or inf"):
         match_nodes([[np.nan]], [[1.0]])

@@ -81,3 +81,13 @@ def test_time_is_positive(whole, time):
     for function in (heat_kernel, diffusion_distance):
         with pytest.raises(ParameterError, match=r"time=.*expected positive finite numbers"):
             function(whole, time, 0)
+
+
+def test_what_is_no_spectrum_or_no_time_is_refused(whole):
+    """A shape, or a word."""
+    with pytest.raises(ParameterError, match="expected Spectrum, got Shape; make it"):
+        heat_kernel(whole.shape, 1.0, [0])
+    with pytest.raises(ParameterError, match="expected Spectrum, got Shape; make it"):
+        diffusion_distance(whole.shape, 1.0, [0])
+    with pytest.raises(ParameterError, match=r"time=.*expected positive finite numbers"):
+        heat_kernel(whole, "a", [0])

@@ -87,3 +87,12 @@ def test_jumps_need_different_values():
 def test_limits_are_those_of_all_shapes_together():
     """But for the share that is left out at each end."""
     assert map_limits([np.zeros((50, 1)), np.ones((50, 1))], 0) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_values_that_are_not_finite_are_refused(wrong):
+    """Shares would not add up to 1, and quantiles would be no numbers."""
+    with pytest.raises(ParameterError, match="must be finite"):
+        joint_histogram([0.5, wrong], [0.5, 0.5], ((0, 1), (0, 1)))
+    with pytest.raises(ParameterError, match="all finite"):
+        first_jumps([0.0, wrong, 1.0])

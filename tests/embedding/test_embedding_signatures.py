@@ -131,3 +131,22 @@ def test_impossible_options_are_refused(dog):
         scale_invariant_signature(dog, 1000)
     with pytest.raises(ParameterError, match="no two values above zero among 2; solve for more pairs"):
         heat_kernel_signature(dog.truncated(2))
+
+
+def test_a_narrow_deviation_counts_the_nearest_value_alone(dog):
+    """However narrow: squares of distances may be more than a float64 holds."""
+    first = wave_kernel_signature(dog, dog.values[[7]], deviation=1e-5)
+    np.testing.assert_allclose(wave_kernel_signature(dog, dog.values[[7]], deviation=1e-300), first)
+
+
+def test_spans_sizes_and_counts_out_of_range_are_refused(dog):
+    """Three ends, no size, no pair, and what is no spectrum."""
+    with pytest.raises(ParameterError, match="expected the lowest and the highest eigenvalue"):
+        scale_invariant_signature(dog, span=(1.0, 2.0, 3.0))
+    with pytest.raises(ParameterError, match="size="):
+        shared_values(0.0, 2, 10, 3)
+    for arguments in ((1.0, 0, 10, 3), (1.0, 2, 0, 3), (1.0, 2, 10, 0), (1.0, 2, 10, 2.5)):
+        with pytest.raises(ParameterError, match="must be a whole number of at least 1"):
+            shared_values(*arguments)
+    with pytest.raises(ParameterError, match="expected Spectrum, got Shape; make it"):
+        heat_kernel_signature(dog.shape)

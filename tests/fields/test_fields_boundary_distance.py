@@ -93,5 +93,7 @@ def test_fields_that_are_no_fields_are_refused():
         with pytest.raises(ParameterError, match="positive, finite"):
             screened_distance([1.0], rho)
     assert screened_distance([0.0], 1.0)[0] == np.inf
+    with pytest.raises(ParameterError, match="positive, finite"):
+        screened_distance([0.5], [1.0, 2.0])
     with pytest.raises(ParameterError, match="read it first"):
         distance_to_boundary(np.ones((3, 3)))

@@ -151,6 +151,8 @@ def test_truncated_keeps_the_lowest():
     assert isinstance(found.truncated(3), Spectrum)
     with pytest.raises(ParameterError, match="n_pairs=11: expected 1 to 10; solve for more"):
         found.truncated(11)
+    with pytest.raises(ParameterError, match=r"n_pairs=2\.0: expected 1 to 10"):
+        found.truncated(2.0)
 
 
 @pytest.mark.parametrize("n_pairs", [0, 13, 2.5, True])

@@ -87,7 +87,7 @@ def surroundings(shape: Shape, values: ArrayLike, lengths: Sequence[float] = LEN
     Raises
     ------
     ParameterError
-        If there is not one value for each node, or a length is not positive.
+        If there is not one finite value for each node, or a length is not positive.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def surroundings(shape: Shape, values: ArrayLike, lengths: Sequence[float] = LEN
     """
     require_kind(shape, Shape, "read it first: spem.read(...)")
     columns = _columns(shape, values)
-    if not lengths or not all(0 < length < np.inf for length in lengths):
+    if not np.size(lengths) or not all(0 < length < np.inf for length in lengths):
         msg = f"lengths={tuple(lengths)}: expected positive lengths, in units of the shape's size"
         raise ParameterError(msg)
     whole = assemble(shape)
@@ -151,7 +151,7 @@ def match_nodes(source: ArrayLike, target: ArrayLike) -> NDArray[np.int64]:
     [1, 0]
     """
     own, other = np.asarray(source, np.float64), np.asarray(target, np.float64)
-    if own.ndim != 2 or other.ndim != 2 or own.shape[1] != other.shape[1] or not len(other):
+    if own.ndim != 2 or other.ndim != 2 or own.shape[1] != other.shape[1] or not other.size:
         msg = f"features of shapes {own.shape} and {other.shape}: expected (n, k) and (m, k) of one k"
         raise ParameterError(msg)
     if not (np.isfinite(own).all() and np.isfinite(other).all()):
@@ -166,6 +166,9 @@ def _columns(shape: Shape, values: ArrayLike) -> NDArray[np.float64]:
     columns = nodal[:, None] if nodal.ndim == 1 else nodal
     if columns.ndim != 2 or len(columns) != shape.n_nodes:
         msg = f"{shape.name}: values must be ({shape.n_nodes}, n), one row a node, not {nodal.shape}"
+        raise ParameterError(msg)
+    if not np.isfinite(columns).all():
+        msg = f"{shape.name}: values hold NaN or inf; expected finite numbers at all nodes"
         raise ParameterError(msg)
     return columns
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spem.errors import ParameterError
+from spem.errors import ParameterError, require_kind
 from spem.fields.spectrum import Spectrum
 
 Array = NDArray[np.float64]
@@ -43,6 +43,7 @@ def heat_kernel(spectrum: Spectrum, time: float, sources: ArrayLike) -> Array:
     >>> heat.sum(axis=0).round(6).tolist()
     [1.0, 1.0]
     """
+    require_kind(spectrum, Spectrum, "make it: spem.solve_spectrum(shape)")
     nodes = _nodes(spectrum, sources)
     weight = np.exp(-spectrum.values * positive([time], "time")[0])
     return np.asarray((spectrum.vectors * weight) @ spectrum.vectors[nodes].T)
@@ -76,6 +77,7 @@ def diffusion_distance(spectrum: Spectrum, time: float, sources: ArrayLike) -> A
     >>> distance.shape == (disk.n_nodes, 1), float(distance[7, 0])
     (True, 0.0)
     """
+    require_kind(spectrum, Spectrum, "make it: spem.solve_spectrum(shape)")
     nodes = _nodes(spectrum, sources)
     embedded = spectrum.vectors * np.exp(-spectrum.values * positive([time], "time")[0])
     columns = [np.linalg.norm(embedded - embedded[node], axis=1) for node in nodes]
@@ -95,7 +97,10 @@ def positive(values: ArrayLike, name: str) -> Array:
     >>> positive([1, 2], "times")
     array([1., 2.])
     """
-    numbers = np.asarray(values, np.float64)
+    try:
+        numbers = np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
     if numbers.ndim != 1 or not numbers.size or not (np.isfinite(numbers) & (numbers > 0)).all():
         msg = f"{name}={values!r}: expected positive finite numbers"
         raise ParameterError(msg)

@@ -60,7 +60,7 @@ def joint_histogram(
     Raises
     ------
     ParameterError
-        If x and y differ in length, or limits do not rise.
+        If x and y differ in length or are not finite, or limits do not rise.
 
     Examples
     --------
@@ -70,6 +70,9 @@ def joint_histogram(
     columns = [np.asarray(x, np.float64), np.asarray(y, np.float64)]
     if columns[0].shape != columns[1].shape or columns[0].ndim != 1 or not columns[0].size:
         msg = f"joint histogram: x and y must be two columns of one length, not {[c.shape for c in columns]}"
+        raise ParameterError(msg)
+    if not all(np.isfinite(column).all() for column in columns):
+        msg = "joint histogram: x and y must be finite"
         raise ParameterError(msg)
     for low, high in limits:
         if not low < high:
@@ -135,8 +138,8 @@ def first_jumps(values: ArrayLike, bins: int = 64) -> tuple[float, float]:
     (-2.9, 5.1)
     """
     array = np.ravel(np.asarray(values, np.float64))
-    if array.size == 0 or not array.min() < array.max():
-        msg = "thresholds at jumps of a histogram: expected at least two different values"
+    if array.size == 0 or not array.min() < array.max() or not np.isfinite(array).all():
+        msg = "thresholds at jumps of a histogram: expected at least two different values, all finite"
         raise ParameterError(msg)
     ends = np.quantile(array, (LEAST_SHARE, 1 - LEAST_SHARE))
     counts, edges = np.histogram(array, bins=bins, range=tuple(ends))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spem.embedding.heat import positive
-from spem.errors import ParameterError
+from spem.errors import ParameterError, require_kind
 from spem.fields.spectrum import Spectrum
 
 Array = NDArray[np.float64]
@@ -99,7 +99,11 @@ def scale_invariant_signature(
     >>> bool(np.allclose(one, two))
     True
     """
-    low, high = positive(_span(spectrum) if span is None else span, "span")
+    ends = positive(_span(spectrum) if span is None else span, "span")
+    if ends.size != 2:
+        msg = f"span={span!r}: expected the lowest and the highest eigenvalue"
+        raise ParameterError(msg)
+    low, high = ends
     octaves = math.log2(high / low / _EARLY) if high > low else 0.0
     steps = int(_PER_OCTAVE * octaves) + 1
     _count("n_frequencies", n_frequencies, (steps - 1) // 2)
@@ -157,7 +161,8 @@ def wave_kernel_signature(
         energies = np.exp(np.linspace(low + 2 * sigma, high - 2 * sigma, _count("n_energies", n_energies)))
     excited = _above_zero(spectrum)
     distance = np.log(positive(energies, "energies")) - np.log(spectrum.values[excited])[:, None]
-    exponent = -np.square(distance / sigma) / 2
+    with np.errstate(over="ignore"):
+        exponent = np.maximum(-np.square(distance / sigma) / 2, -np.finfo(np.float64).max)
     # the nearest value counts whole, so that an energy far from all of them does not divide zero by zero
     weight = np.exp(exponent - exponent.max(axis=0))
     return np.asarray(np.square(spectrum.vectors[:, excited]) @ (weight / weight.sum(axis=0)))
@@ -185,11 +190,19 @@ def shared_values(size: float, ndim: int, n_pairs: int, count: int) -> Array:
     numpy.ndarray
         ``(count,)`` ascending, in 1/length².
 
+    Raises
+    ------
+    ParameterError
+        When the size is not positive, or a number is below 1.
+
     Examples
     --------
     >>> shared_values(1.0, 2, 100, 3).round(1).tolist()
     [1.0, 25.1, 628.3]
     """
+    positive([size], "size")
+    for name, number in {"ndim": ndim, "n_pairs": n_pairs, "count": count}.items():
+        _count(name, number)
     ball = math.pi ** (ndim / 2) / math.gamma(ndim / 2 + 1)
     highest = 2 * math.pi**2 * (n_pairs / ball) ** (2 / ndim)
     return np.asarray(np.geomspace(1.0, highest, count) / size**2)
@@ -229,6 +242,7 @@ def _above_zero(spectrum: Spectrum) -> NDArray[np.bool_]:
 
 def _span(spectrum: Spectrum) -> tuple[float, float]:
     """Return the first value above zero and the last."""
+    require_kind(spectrum, Spectrum, "make it: spem.solve_spectrum(shape)")
     values = spectrum.values[_above_zero(spectrum)]
     if values.size < 2 or not values[-1] > values[0]:
         msg = (

@@ -96,7 +96,7 @@ def screened_distance(v: ArrayLike, rho: float) -> NDArray[np.float64]:
     array([0., 1., 2.])
     """
     values = np.asarray(v, np.float64)
-    if not 0 < rho < np.inf:
+    if np.ndim(rho) or not 0 < rho < np.inf:
         msg = f"rho={rho!r}: a distance needs a positive, finite ρ"
         raise ParameterError(msg)
     if not (values >= 0).all():

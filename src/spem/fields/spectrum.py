@@ -54,7 +54,7 @@ class Spectrum:
         ParameterError
             When there are fewer.
         """
-        if not 1 <= n_pairs <= self.n_pairs:
+        if not _is_whole(n_pairs) or not 1 <= n_pairs <= self.n_pairs:
             msg = f"{self.shape.name}: n_pairs={n_pairs}: expected 1 to {self.n_pairs}; solve for more"
             raise ParameterError(msg)
         return replace(self, values=self.values[:n_pairs], vectors=self.vectors[:, :n_pairs])
@@ -118,9 +118,7 @@ def solve_spectrum(
         msg = f"boundary={boundary!r}: expected 'free' or 'absorbing'"
         raise ParameterError(msg)
     system = assemble(shape, model)
-    number: Any = n_pairs
-    whole = isinstance(number, (int, np.integer)) and not isinstance(number, bool)
-    if not whole or not 1 <= n_pairs <= system.n_nodes:
+    if not _is_whole(n_pairs) or not 1 <= n_pairs <= system.n_nodes:
         msg = f"{shape.name}: n_pairs={n_pairs}: expected 1 to {system.n_nodes}, the number of nodes"
         raise ParameterError(msg)
     if boundary == "free":
@@ -165,6 +163,11 @@ def free_system(system: System) -> System:
     nothing = np.zeros(system.n_nodes)
     diagonal = inside.astype(np.float64) @ np.repeat(system.weights, 2)
     return replace(system, rhs=nothing, diagonal=diagonal, mass=np.ones(system.n_nodes))
+
+
+def _is_whole(number: Any) -> bool:
+    """Tell whole numbers from others, and from truth values."""
+    return isinstance(number, (int, np.integer)) and not isinstance(number, bool)
 
 
 def _component_pairs(
