@@ -9,11 +9,12 @@ a node to the boundary, their bases nearly coincide: what is left to tell them a
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 import spem
 from spem.paper.consistency import PAPER_RADIUS, PAPER_RHO, RTOL, basis_cosines, largest_subspace_angle, pairs
 from spem.paper.data import Data
-from spem.paper.findings import Finding, Picture, judged
+from spem.paper.findings import Claim, Finding, Picture, judged
 from spem.paper.present import present
 from spem.paper.scaling import scaled
 from spem.plots.basis_grid import draw_bases
@@ -39,8 +40,28 @@ def make(data: Data) -> Finding:
     )
     angles = [np.degrees(np.arccos(pairs(basis_cosines(maps)).min(axis=0))) for maps in (before, after)]
     spaces = [largest_subspace_angle(maps) for maps in (before, after)]
+    numbers = {
+        "n": list(POINTS),
+        "inner_radius_px": inner,
+        "largest_angle_before_deg": angles[0],
+        "largest_angle_after_deg": angles[1],
+        "subspace_angle_before_deg": spaces[0],
+        "subspace_angle_after_deg": spaces[1],
+    }
+    pictures = (
+        Picture("stars", draw_stars(), "The star polygons {n/4}, points on one circle."),
+        Picture(
+            "bases", draw(before, after), "Φₙ before (left) and after rescaling to one inner radius (right)."
+        ),
+    )
+    source = f"Star polygons made here as in the paper, of circumradius {RADIUS:g} px; ρ from 2 to 30 px."
+    return Finding(source, claims(angles, spaces, inner), pictures, numbers)
+
+
+def claims(angles: list[NDArray[np.float64]], spaces: list[float], inner: list[float]) -> tuple[Claim, ...]:
+    """Judge the angles between two stars before and after rescaling."""
     words = [", ".join(f"{angle:.1f}" for angle in several) for several in angles]
-    claims = (
+    return (
         judged(
             "Rescaled to one inner radius, the first six eigenvectors of star polygons are almost identical "
             "(4.2.1, Fig. 10).",
@@ -59,22 +80,6 @@ def make(data: Data) -> Finding:
             note="Some basis vector differs more after rescaling than before.",
         ),
     )
-    numbers = {
-        "n": list(POINTS),
-        "inner_radius_px": inner,
-        "largest_angle_before_deg": angles[0],
-        "largest_angle_after_deg": angles[1],
-        "subspace_angle_before_deg": spaces[0],
-        "subspace_angle_after_deg": spaces[1],
-    }
-    pictures = (
-        Picture("stars", draw_stars(), "The star polygons {n/4}, points on one circle."),
-        Picture(
-            "bases", draw(before, after), "Φₙ before (left) and after rescaling to one inner radius (right)."
-        ),
-    )
-    source = f"Star polygons made here as in the paper, of circumradius {RADIUS:g} px; ρ from 2 to 30 px."
-    return Finding(source, claims, pictures, numbers)
 
 
 def draw_stars() -> Figure:

@@ -50,7 +50,7 @@ def test_fig15_regions_of_a_solid_are_steadier_than_those_of_its_silhouette():
     """One threshold for all poses; the claims about the horse itself are not tested without it."""
     finding = made("fig15")
     assert finding.numbers["variation_solid"] < finding.numbers["variation_silhouette"]
-    assert finding.numbers["thresholds"]["P₂ above"] == 0
+    assert finding.numbers["threshold"]["P₂ above"] == 0
     assert [claim.verdict for claim in finding.claims] == ["not tested"] * 2
 
 

@@ -14,11 +14,10 @@ from spem.embedding.histograms import first_jumps
 from spem.embedding.maps import Maps
 from spem.paper.consistency import RTOL, paper_rho
 from spem.paper.regions import region_sizes
+from spem.plots.figures import map_name
 from spem.shapes.components import keep_components
 from spem.shapes.shape import Shape
 
-# Seen with the second coordinate up, as the meshes of horses have it, from the front left and a little above.
-SIDE_VIEW = (18.0, 118.0)
 # Pictures leave out what is nearer to the boundary than so many voxels, where the layers of higher maps are
 # thinner than the grid, and pieces smaller than this share of the nodes.
 LAYER, LEAST_PIECE = 1.5, 0.0005
@@ -47,6 +46,11 @@ class Region:
     upper: bool
     shares: NDArray[np.float64]
     pieces: NDArray[np.int64]
+
+    @property
+    def name(self) -> str:
+        """Name of the map, and on which side of the threshold it lies."""
+        return f"{map_name(self.map)} {'above' if self.upper else 'below'}"
 
     @property
     def variation(self) -> float:
@@ -109,6 +113,18 @@ def regions(several: Sequence[Maps], which: Sequence[int]) -> list[Region]:
             sizes = [region_sizes(m.shape, mask) for m, mask in zip(several, inside, strict=True)]
             found.append(Region(j, threshold, upper, shares, np.array([len(size) for size in sizes])))
     return found
+
+
+def mean_variation(several: Sequence[Region]) -> float:
+    """Return the mean variation of regions.
+
+    Examples
+    --------
+    >>> region = Region(1, 0.0, True, np.array([0.1, 0.3]), np.array([1, 1]))
+    >>> round(mean_variation([region]), 3)
+    0.5
+    """
+    return float(np.mean([region.variation for region in several]))
 
 
 def clear_values(maps: Maps, j: int, thresholds: tuple[float, float]) -> NDArray[np.float64]:
