@@ -121,3 +121,13 @@ def test_too_many_maps_are_refused(cross):
     """There are no more maps than sampled ρ."""
     with pytest.raises(ParameterError, match="n_maps=9: expected 1 to 2, the number of sampled rho"):
         spem.maps(cross, rho=[2.0, 4.0], n_maps=9)
+
+
+@pytest.mark.parametrize("counts", [(1,), (2,), (3,), (1, 1), (1, 1, 1, 1)])
+def test_a_few_nodes_have_maps(counts):
+    """Also where there are no more nodes than dimensions of the basis and the constant together."""
+    shape = Shape.from_mask(np.ones(counts))
+    maps = spem.maps(shape, 3)
+    fields = np.stack([spem.field(shape, rho, solver=Direct()) for rho in maps.rho], axis=1)
+    assert np.allclose(maps.values, fields @ maps.basis, atol=1e-5)
+    assert np.isfinite(spem.maps(shape, 3, centred=True).values).all()

@@ -106,7 +106,7 @@ def compute_maps(field: Hyperfield, n_maps: int = 6, *, centred: bool = False) -
     if not 1 <= n_maps <= field.rho.size:
         msg = f"n_maps={n_maps}: expected 1 to {field.rho.size}, the number of sampled rho"
         raise ParameterError(msg)
-    upper = np.linalg.cholesky(field.gram).T
+    upper = _root(field.gram)
     small = upper @ field.coefficients()
     if centred:
         small[0] = 0.0  # the part along the constant
@@ -114,10 +114,19 @@ def compute_maps(field: Hyperfield, n_maps: int = 6, *, centred: bool = False) -
     size = np.pad(size, (0, max(0, n_maps - size.size)))
     left, basis = _complete(left, n_maps), _complete(right.T, n_maps)
     sign = _signs(basis, int(np.argmax(field.rho)))
-    mix = np.linalg.solve(upper, left * (size[:n_maps] * sign))
+    mix = np.linalg.lstsq(upper, left * (size[:n_maps] * sign))[0]
     values = field.basis @ mix[1:].astype(field.basis.dtype) + mix[0].astype(field.basis.dtype)
     variance, total = np.square(size) / field.shape.n_nodes, np.square(size).sum() / field.shape.n_nodes
     return Maps(field.shape, values, basis * sign, variance[:n_maps], field.rho, float(total), centred)
+
+
+def _root(gram: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return R with RᵀR = G; on a few nodes the constant lies in the span of the basis, and R is singular."""
+    try:
+        return np.asarray(np.linalg.cholesky(gram).T)
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(gram)
+        return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T)
 
 
 def _signs(basis: NDArray[np.float64], last: int) -> NDArray[np.float64]:
