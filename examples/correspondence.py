@@ -19,10 +19,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from spem.embedding.correspondence import match_nodes
-from spem.paper.corresponding import Poses, absences, load_poses
+from spem.paper.correspondence import AROUND, CHANCE, Errors, descriptors, match_errors
 from spem.paper.data import Data
 from spem.paper.findings import Claim, Finding, Picture, judged
-from spem.paper.matching import AROUND, CHANCE, Errors, descriptors, match_errors
+from spem.paper.poses import Poses, absences, load_poses
 from spem.paper.present import present
 from spem.plots.fields import draw_values
 from spem.plots.style import COLOURS, INK, MUTED, TEXT_SIZE, TITLE_SIZE, bare, framed, new_figure

@@ -21,11 +21,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spem.paper.agreement import Agreement
-from spem.paper.corresponding import absences, load_poses
 from spem.paper.data import Data
 from spem.paper.findings import Finding, Picture
+from spem.paper.pca import judge, measure
+from spem.paper.poses import absences, load_poses
 from spem.paper.present import present
-from spem.paper.rivals import judge, measure
 from spem.plots.style import COLOURS, INK, MARKERS, TEXT_SIZE, TITLE_SIZE, framed, new_figure
 
 N_COMPONENTS = 6

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 import spem
 from spem.paper.agreement import agreement, beyond, correlations, own_partners
-from spem.paper.corresponding import Poses, absences, depth_at, load_poses
 from spem.paper.data import Data
 from spem.paper.findings import Claim, Finding, Picture, judged
+from spem.paper.poses import Poses, absences, depth_at, load_poses
 from spem.paper.present import present
 from spem.paper.scaling import values_at
 from spem.plots.style import COLOURS, DASHES, INK, MUTED, TEXT_SIZE, TITLE_SIZE, framed, new_figure

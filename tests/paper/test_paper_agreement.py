@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spem.paper.agreement import agreement, beyond, own_partners
-from spem.paper.matching import Errors
+from spem.paper.correspondence import Errors
 from spem.paper.reductions import METHODS, centred_components, probabilistic_components
 
 

@@ -19,7 +19,7 @@ from spem.embedding.signatures import (
 )
 from spem.fields.geodesics import inner_distances
 from spem.fields.spectrum import solve_spectrum
-from spem.paper.corresponding import Poses
+from spem.paper.poses import Poses
 from spem.shapes.shape import Shape
 
 # Maps down to 1e-14 of the variance: to there they are consistent from pose to pose.
@@ -105,7 +105,7 @@ def match_errors(poses: Poses, features: list[dict[str, NDArray[np.float64]]]) -
 
     Examples
     --------
-    >>> from spem.paper.corresponding import load_poses
+    >>> from spem.paper.poses import load_poses
     >>> from spem.paper.data import Data
     >>> [poses] = load_poses(Data(quick=True), n_inside=2, n_marks=20)
     >>> found = match_errors(poses, [{"place": shape.points} for shape in poses.shapes])

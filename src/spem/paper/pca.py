@@ -8,8 +8,8 @@ import numpy as np
 
 from spem.api.fields import sweep
 from spem.paper.agreement import SAME, Agreement, agreement
-from spem.paper.corresponding import Poses, fields_at
 from spem.paper.findings import Claim, judged
+from spem.paper.poses import Poses, fields_at
 from spem.paper.reductions import METHODS, STARTED
 
 LINEAR = "PCA (SPEM)"
@@ -24,7 +24,7 @@ def measure(poses: Poses, n_components: int, n_rho: int = 64) -> dict[str, Agree
 
     Examples
     --------
-    >>> from spem.paper.corresponding import load_poses
+    >>> from spem.paper.poses import load_poses
     >>> from spem.paper.data import Data
     >>> [poses] = load_poses(Data(quick=True), n_inside=60, n_marks=2)
     >>> len(measure(poses, 2, n_rho=8))

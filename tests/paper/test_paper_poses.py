@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from scipy.special import i0
 
 import spem
-from spem.paper.corresponding import COLLECTIONS, Poses, carried, depth_at, fields_at, load_poses
 from spem.paper.data import Data
+from spem.paper.poses import COLLECTIONS, Poses, carried, depth_at, fields_at, load_poses
 
 
 def test_a_rigid_motion_carries_every_point_with_it():
