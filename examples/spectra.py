@@ -71,21 +71,24 @@ def claims_of(found: KindScores, name: str, absent: str, *, tested: bool) -> lis
     ahead = [round(ours, 1) >= round(best, 1) for _, ours, _, best in rivals]
     words = [f"{n} features: SPEM {ours:.1f}, {NAMES[k]} {best:.1f}" for n, ours, k, best in rivals]
     every = ", ".join(f"{NAMES[kind]} {tier[max(COUNTS)]:.1f}" for kind, tier in found.tiers.items())
-    deviation = max(row.deviation["FT"] for row in found.rows.values())
+    label, ours, theirs = found.most_apart(rivals[-1][2])
+    behind = (
+        f"{NAMES[rivals[-1][2]]} is ahead, most on class {label} ({theirs:.0f} against {ours:.0f}). The "
+        "paper compares with heat kernels of surfaces in their own codes; its code serves volumes too."
+    )
     power = judged(
-        f"The embedding has power: no volumetric signature in its code has a higher FT on {name} (3.3).",
-        "representation power, verified experimentally",
+        f"The embedding has representation power (3.3); read as: on {name} no volumetric signature has a "
+        "higher FT in the same code.",
+        "verified experimentally",
         every if tested else "not measured",
         ahead[-1],
-        note=f"{words[-1]}, where seeds differ by up to {deviation:.1f}. The paper compares with heat "
-        "kernels of surfaces in codes of their own; its code serves those of volumes as well."
-        if tested
-        else absent,
+        note=behind if tested else absent,
         tested=tested,
     )
     compact = judged(
-        f"The embedding is compact: with few features no signature has a higher FT on {name} (3.3).",
-        "compactness, verified experimentally",
+        f"The embedding is compact (3.3); read as: on {name} no volumetric signature has a higher FT with "
+        "few features a node.",
+        "verified experimentally",
         "; ".join(words[:-1]) if tested else "not measured",
         all(ahead[:-1]),
         note="Another signature tells more with as few." if tested else absent,

@@ -47,6 +47,10 @@ def test_rival_is_the_best_of_the_others(creatures):
     kind, best = found.rival(2)
     assert kind != "spem"
     assert best == max(tier[2] for name, tier in found.tiers.items() if name != "spem")
+    label, ours, theirs = found.most_apart(kind)
+    gains = [found.rows[k].scores[0].per_class() for k in (kind, "spem")]
+    assert theirs - ours == max(gains[0][each]["FT"] - gains[1][each]["FT"] for each in ("hand", "fish"))
+    assert label in ("hand", "fish")
 
 
 def test_shared_variance_weighs_features():

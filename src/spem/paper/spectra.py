@@ -58,6 +58,12 @@ class KindScores:
         best = max(others, key=lambda kind: others[kind])
         return best, others[best]
 
+    def most_apart(self, kind: Kind) -> tuple[str, float, float]:
+        """Return the class over which another kind is most ahead of SPEM, and the first tiers of both."""
+        ours, theirs = self.rows["spem"].scores[0].per_class(), self.rows[kind].scores[0].per_class()
+        label = max(ours, key=lambda each: theirs[each]["FT"] - ours[each]["FT"])
+        return str(label), ours[label]["FT"], theirs[label]["FT"]
+
     def to_json(self) -> dict[str, Any]:
         """Return all figures."""
         return {
