@@ -104,7 +104,7 @@ def test_arguments_that_do_not_fit_are_refused():
         classify_vectors(apart(), ["cat", "dog"])
     with pytest.raises(ParameterError, match="one finite vector"):
         classify_vectors(np.full((len(LABELS), 2), np.nan), LABELS, n_train=2)
-    with pytest.raises(ParameterError, match="repeats=0 must be at least 1"):
+    with pytest.raises(ParameterError, match="repeats=0 must be a whole number of at least 1"):
         classify_vectors(apart(), LABELS, repeats=0)
 
 
@@ -112,3 +112,29 @@ def test_a_perfect_classification_is_written_in_percent():
     """As all scores are."""
     found = Classification(("a", "b"), np.array([1.0, 0.5]), np.eye(2, dtype=np.int64), np.zeros(2), 1)
     assert (found.mean, found.per_class()) == (75.0, {"a": 100.0, "b": 100.0})
+
+
+@pytest.mark.parametrize("missing", [None, float("nan"), np.nan])
+def test_missing_labels_are_no_class(missing):
+    """As an empty cell of a table is read."""
+    with pytest.raises(LabelError, match="row 1 has no label"):
+        classify_vectors(apart(), [LABELS[0], missing, *LABELS[2:]])
+
+
+@pytest.mark.parametrize("name", ["n_train", "repeats"])
+@pytest.mark.parametrize("number", [0, 1.5, True, None, "2"])
+def test_numbers_of_splits_are_whole(name, number):
+    """One at least."""
+    with pytest.raises(ParameterError, match=f"{name}=.* must be a whole number of at least 1"):
+        classify_vectors(apart(), LABELS, **{name: number})
+
+
+def test_vectors_of_words_and_labels_of_lists_are_refused():
+    """And vectors without an entry."""
+    for vectors, labels in (
+        ("words", LABELS),
+        (apart(), [[label] for label in LABELS]),
+        (apart()[:, :0], LABELS),
+    ):
+        with pytest.raises(ParameterError, match="expected"):
+            classify_vectors(vectors, labels)

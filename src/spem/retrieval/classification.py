@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spem.codes.arguments import whole_number
 from spem.errors import LabelError, ParameterError
 
 
@@ -97,7 +98,7 @@ def classify_vectors(
     Raises
     ------
     LabelError
-        When there are fewer than two classes, or one has no shape left to test.
+        When there are fewer than two classes, one has no shape left to test, or a label is None or NaN.
     ParameterError
         When vectors and labels do not fit, vectors are not finite, or a number is below 1.
 
@@ -205,15 +206,27 @@ def _checked(
     vectors: ArrayLike, labels: Sequence[Hashable], n_train: int, repeats: int
 ) -> NDArray[np.float64]:
     """Check vectors against labels, and numbers against their range."""
-    values = np.asarray(vectors, np.float64)
-    if values.ndim != 2 or len(values) != len(labels) or not np.isfinite(values).all():
+    try:
+        values = np.asarray(vectors, np.float64)
+        unlabelled = [row for row, label in enumerate(labels) if label is None or _is_nan(label)]
+    except (TypeError, ValueError) as error:
+        msg = f"expected numbers, one vector a shape, and labels that can be compared: {error}"
+        raise ParameterError(msg) from error
+    if unlabelled:
+        msg = f"row {unlabelled[0]} has no label ({labels[unlabelled[0]]}); give it one, or leave it out"
+        raise LabelError(msg)
+    if values.ndim != 2 or not values.shape[1] or len(values) != len(labels) or not np.isfinite(values).all():
         msg = f"vectors of shape {values.shape} for {len(labels)} labels: expected one finite vector a label"
         raise ParameterError(msg)
     for name, number in {"n_train": n_train, "repeats": repeats}.items():
-        if number < 1:
-            msg = f"{name}={number} must be at least 1"
-            raise ParameterError(msg)
+        whole_number(name, number)
     return values
+
+
+def _is_nan(label: Hashable) -> bool:
+    """Tell labels that are no number, as tables have where one is missing; a label must be hashable."""
+    hash(label)
+    return isinstance(label, float) and label != label
 
 
 def _check_sizes(code: NDArray[np.int64], classes: Sequence[Hashable], n_train: int) -> None:
