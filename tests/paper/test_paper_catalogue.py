@@ -25,12 +25,12 @@ def test_titles_and_texts_are_there():
 
 
 def test_all_stands_for_every_item():
-    """Whatever else is named."""
+    """Whatever other item is named."""
     assert choose(["fig1", "all"]) == ITEMS
 
 
 @pytest.mark.parametrize("name", ["fig21", "tabel1", "Fig13", "nothing like it", ""])
 def test_unknown_item_is_refused_with_the_nearest(name):
     """The message names the wrong word and what to do."""
-    with pytest.raises(ParameterError, match=f"{name}: no such item of the paper"):
-        choose([name])
+    with pytest.raises(ParameterError, match=f"{name or 'an empty name'}: no such item of the paper"):
+        choose(["all", name])

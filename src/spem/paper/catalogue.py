@@ -116,16 +116,14 @@ def choose(names: Sequence[str]) -> tuple[Item, ...]:
         ...
     spem.errors.ParameterError: fig21: no such item of the paper; the nearest are fig2, fig1, fig19
     """
-    if ALL in names:
-        return ITEMS
     known = [item.name for item in ITEMS]
     for name in names:
-        if name not in known:
+        if name not in (*known, ALL):
             near = difflib.get_close_matches(name.lower(), known, n=3, cutoff=0.4)
             advice = f"the nearest are {', '.join(near)}" if near else "spem paper lists them"
-            msg = f"{name}: no such item of the paper; {advice}"
+            msg = f"{name or 'an empty name'}: no such item of the paper; {advice}"
             raise ParameterError(msg)
-    return tuple(item for item in ITEMS if item.name in names)
+    return tuple(item for item in ITEMS if item.name in names or ALL in names)
 
 
 def _folder() -> Path:

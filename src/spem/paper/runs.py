@@ -235,11 +235,12 @@ def _writer(content: bytes) -> Callable[[Any], Any]:
 
 
 def _origin(item: Item, data: Data) -> dict[str, Any]:
-    """Say what a record depends on: version, script, size and which of its collections are there."""
-    stamp = item.script.read_bytes()
+    """Say what a record depends on: version, script and machinery, size and which collections are there."""
+    sources = [item.script, *sorted(Path(__file__).parent.glob("*.py"))]
+    stamp = sha256(b"\0".join(source.read_bytes() for source in sources))
     return {
         "spem": spem.__version__,
-        "script": sha256(stamp).hexdigest()[:16],
+        "code": stamp.hexdigest()[:16],
         "quick": data.quick,
         "data": None if data.folder is None else sorted(p.name for p in data.folder.iterdir() if p.is_dir()),
     }

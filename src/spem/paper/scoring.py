@@ -80,6 +80,11 @@ class Repeated:
         """Return the five measures with one decimal."""
         return [f"{self.mean[measure]:.1f}" for measure in MEASURES]
 
+    def hardest(self, count: int = 3) -> str:
+        """Name the classes of the least first tier, with it."""
+        tiers = sorted((score["FT"], str(label)) for label, score in self.scores[0].per_class().items())
+        return ", ".join(f"{label} {tier:.0f}" for tier, label in tiers[:count])
+
     def to_json(self) -> dict[str, object]:
         """Return means, deviations and the error by classes."""
         return {"mean": self.mean, "deviation": self.deviation, "class_error_FT": self.class_error}
