@@ -112,6 +112,8 @@ def test_wrong_kinds_are_refused():
     ball = spem.synthetic.ball(radius=4.0, spacing=1.0)
     with pytest.raises(ShapeError, match="silhouettes; this shape has 3"):
         hu_moments(ball)
+    with pytest.raises(ParameterError, match="expected Shape, got ndarray"):
+        hu_moments(BLOT)
     with pytest.raises(ParameterError, match="expected one weight for each of"):
         hu_moments(Shape.from_mask(BLOT), [1.0])
     with pytest.raises(ParameterError, match="compression='ln' must be one of log, arsinh, none"):

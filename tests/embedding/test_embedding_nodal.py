@@ -106,3 +106,11 @@ def test_domains_refuse_thresholds_that_do_not_fit():
         nodal_domains(np.ones((3, 2)), [[-1.0, 1.0]])
     with pytest.raises(ParameterError, match="thresholds of shape"):
         nodal_domains(np.ones((3, 1)), [[1.0, -1.0]])
+
+
+def test_maps_are_asked_for_their_values():
+    """`Maps` in place of an array."""
+    maps = spem.maps(spem.synthetic.disk(radius=6.0, spacing=1.0), 2)
+    for call in (lambda: nodal_domains(maps), lambda: nodal_thresholds([maps])):
+        with pytest.raises(ParameterError, match=r"expected values of nodes, got Maps; give maps\.values"):
+            call()

@@ -110,14 +110,20 @@ def test_sources_are_measured_from_their_cuts():
         ([99], "no node 99, expected 0 to 11"),
         ([-1], "no node -1"),
         ([], "numbers of nodes"),
-        (3, "numbers of nodes"),
         ([0.5], "numbers of nodes"),
+        ([[0, 1]], "numbers of nodes"),
     ],
 )
 def test_what_is_no_node_is_refused(sources, match):
     """Numbers out of range, none at all, and what are no numbers."""
     with pytest.raises(ParameterError, match=match):
         inner_distances(Shape.from_mask(np.ones((3, 4))), sources)
+
+
+def test_one_node_gives_one_row():
+    """A number in place of a list of one."""
+    shape = Shape.from_mask(np.ones((3, 4)))
+    np.testing.assert_array_equal(inner_distances(shape, 3), inner_distances(shape, [3]))
 
 
 def test_wrong_arguments_are_named():

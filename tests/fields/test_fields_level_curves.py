@@ -38,6 +38,13 @@ def test_sign_and_scale():
     squared = (shape.points**2).sum(axis=1)
     up = level_curvature(system, squared, boundary=1.0)
     np.testing.assert_allclose(level_curvature(system, 5 - 3 * squared, boundary=2.0), -up, rtol=1e-9)
+    np.testing.assert_array_equal(level_curvature(shape, squared, boundary=1.0), up)
+
+
+def test_what_is_no_shape_is_refused():
+    """A mask has no boundary yet."""
+    with pytest.raises(ParameterError, match="expected Shape, got ndarray; read it first"):
+        level_curvature(np.ones((3, 3)), np.ones(9))
 
 
 def test_unknown_boundaries_and_flat_fields_have_none():

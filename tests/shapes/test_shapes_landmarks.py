@@ -45,3 +45,15 @@ def test_counts_without_sense_are_refused(n_poses, n_points):
     """There is at least a pose and a pair of points."""
     with pytest.raises(ParameterError, match="expected a pose or more, and an even number of points"):
         creature_poses("fish", n_poses, n_points=n_points, rng=np.random.default_rng(0))
+
+
+def test_poses_say_what_they_are():
+    """In one line, without the points."""
+    poses = creature_poses("fish", 2, voxels=300, n_points=4, rng=np.random.default_rng(0))
+    assert repr(poses) == "CreaturePoses('fish', 2-D, 2 poses, 4 points)"
+
+
+def test_a_seed_in_place_of_a_generator_is_refused():
+    """With what to do."""
+    with pytest.raises(ParameterError, match="expected Generator, got int; make one"):
+        creature_poses("fish", 1, rng=0)

@@ -69,6 +69,7 @@ def hu_moments(
     >>> print(round(float(hu_moments(disk)[0]) * 2 * np.pi, 3))  # the least of all shapes
     1.0
     """
+    require_kind(shape, Shape, "read it first: spem.read(...)")
     weights = np.ones(shape.n_nodes) if nodes is None else np.asarray(nodes, np.float64)
     if weights.shape != (shape.n_nodes,):
         msg = f"{shape.name}: nodes of shape {weights.shape}; expected one weight for each of {shape.n_nodes}"

@@ -47,6 +47,8 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     **dict.fromkeys(("dark", "centred", "drop_boundary"), truth_value),
 }
 _OPTIONAL = ("voxels", "threshold", "dark")
+# What a file says about itself.
+_OF_FILES = ("code_format", "spem_version")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,7 +183,8 @@ class Settings:
         known = [entry.name for entry in fields(cls)]
         unknown = ", ".join(name for name in options if name not in known)
         if unknown:
-            msg = f"{unknown}: no setting of a code; expected any of {', '.join(known)}"
+            usual = ", ".join(name for name in known if name not in _OF_FILES)
+            msg = f"{unknown}: no setting of a code; expected any of {usual}"
             raise ParameterError(msg)
         return cls(**options)
 

@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spem.embedding.maps import Maps
 from spem.errors import ParameterError
 
 Cut = Literal["means", "midway"]
@@ -180,8 +181,11 @@ def _same_maps(maps: Sequence[ArrayLike]) -> list[NDArray[np.floating[Any]]]:
     return checked
 
 
-def _as_maps(values: ArrayLike) -> NDArray[np.floating[Any]]:
+def _as_maps(values: ArrayLike | Maps) -> NDArray[np.floating[Any]]:
     """Check the maps of one shape; single precision stays."""
+    if isinstance(values, Maps):
+        msg = "expected values of nodes, got Maps; give maps.values"
+        raise ParameterError(msg)
     nodes = np.asarray(values)
     nodes = nodes if nodes.dtype.kind == "f" else nodes.astype(np.float64)
     if nodes.ndim != 2 or not nodes.size or not np.isfinite(nodes).all():

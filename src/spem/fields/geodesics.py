@@ -19,15 +19,16 @@ from spem.shapes.shape import Shape
 def inner_distances(shape: Shape, sources: ArrayLike, *, order: Literal[1, 2] = 2) -> NDArray[np.float64]:
     """Return the lengths of the shortest ways from nodes to all nodes that stay inside the shape.
 
-    Straight-line distances where the way is free, exact; round corners by fast marching on the graph of the
-    nodes. Edges that the surface cuts are not crossed: parts which touch only through the grid stay apart.
+    Inner geodesic distances: straight-line ones where the way is free, exact; round corners by fast marching
+    on the graph of the nodes. Edges that the surface cuts are not crossed: parts which touch only through the
+    grid stay apart.
 
     Parameters
     ----------
     shape
         Any shape.
     sources
-        ``(n_sources,)`` numbers of nodes.
+        ``(n_sources,)`` numbers of nodes, or one.
     order
         Highest order of the upwind differences.
 
@@ -121,9 +122,9 @@ def _distances(
 
 def _node_numbers(nodes: ArrayLike, shape: Shape) -> NDArray[np.int64]:
     """Return node numbers as such."""
-    numbers = np.asarray(nodes)
+    numbers = np.atleast_1d(np.asarray(nodes))
     if numbers.ndim != 1 or numbers.size == 0 or numbers.dtype.kind not in "iu":
-        msg = f"{shape.name}: sources={nodes!r}: expected (n_sources,) numbers of nodes"
+        msg = f"{shape.name}: sources={nodes!r}: expected numbers of nodes, one or (n_sources,)"
         raise ParameterError(msg)
     if numbers.min() < 0 or numbers.max() >= shape.n_nodes:
         stray = numbers.min() if numbers.min() < 0 else numbers.max()

@@ -6,13 +6,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from spem.errors import ParameterError
+from spem.errors import ParameterError, require_kind
 from spem.fields.gradients import gradient
-from spem.fields.operator import System
+from spem.fields.operator import System, assemble
+from spem.shapes.shape import Shape
 
 
 def level_curvature(
-    system: System, values: ArrayLike, *, boundary: ArrayLike | None = None
+    place: Shape | System, values: ArrayLike, *, boundary: ArrayLike | None = None
 ) -> NDArray[np.float64]:
     """Return div(∇v/|∇v|), the curvature of the level curve of v through each node (2.1).
 
@@ -23,12 +24,13 @@ def level_curvature(
 
     Parameters
     ----------
-    system
-        The system whose nodes carry the field.
+    place
+        The shape whose nodes carry the field, or a system made of it.
     values
         ``(n_nodes,)`` the field.
     boundary
-        Its value on the boundary, as `gradient` takes it.
+        Its value on the boundary, 1 for v and 0 for log v: one number, or one a boundary edge. None where it
+        is not known.
 
     Returns
     -------
@@ -43,13 +45,17 @@ def level_curvature(
 
     Examples
     --------
-    >>> from spem.fields.operator import assemble
     >>> from spem.shapes.shape import Shape
     >>> square = Shape.from_mask(np.ones((5, 5)))
-    >>> curvature = level_curvature(assemble(square), np.sum(square.points**2, axis=1))
+    >>> curvature = level_curvature(square, np.sum(square.points**2, axis=1))
     >>> bool(np.isclose(curvature[18], 1 / np.hypot(3, 3)))
     True
     """
+    if isinstance(place, System):
+        system = place
+    else:
+        require_kind(place, Shape, "read it first: spem.read(...)")
+        system = assemble(place)
     slope = gradient(system, values, boundary=boundary)
     nodal = np.ascontiguousarray(values, np.float64)
     ends = np.broadcast_to(

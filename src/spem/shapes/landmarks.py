@@ -34,6 +34,11 @@ class CreaturePoses:
     points: NDArray[np.float64]
     mirror: NDArray[np.int64]
 
+    def __repr__(self) -> str:
+        name = self.shapes[0].name.rpartition(" ")[0]
+        n_points, ndim = self.points.shape[1:]
+        return f"CreaturePoses({name!r}, {ndim}-D, {len(self.shapes)} poses, {n_points} points)"
+
 
 def creature_poses(
     kind: str,

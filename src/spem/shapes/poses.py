@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import ParameterError
+from spem.errors import ParameterError, require_kind
 from spem.shapes.capsules import Capsules
 from spem.shapes.skeletons import Skeleton, skeleton
 
@@ -117,6 +117,7 @@ def random_poses(kind: str, ndim: int, count: int, rng: np.random.Generator) -> 
     if ndim not in (2, 3):
         msg = f"creatures live in 2 or 3 dimensions, not {ndim}"
         raise ParameterError(msg)
+    require_kind(rng, np.random.Generator, "make one: numpy.random.default_rng(seed)")
     bones = skeleton(kind)
     n_parts = bones.part.max() + 1
     length = bones.length * np.exp(LENGTH_JITTER * _bounded_normal(rng, n_parts))[bones.part]

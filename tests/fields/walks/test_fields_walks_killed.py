@@ -210,6 +210,8 @@ def test_wrong_arguments_are_refused():
         estimate_field(walk, nodes=[0], n_walks=0, rng=rng)
     with pytest.raises(ParameterError, match="a walk has its own"):
         estimate_field(walk, 2.0, nodes=[0], n_walks=5, rng=rng)
+    with pytest.raises(ParameterError, match="expected Generator, got int"):
+        estimate_field(walk, nodes=[0], n_walks=5, rng=0)
     with pytest.raises(ParameterError, match="rho is missing"):
         estimate_field(shape, nodes=[0], n_walks=5, rng=rng)
     with pytest.raises(ParameterError, match="level=1: expected a chance"):

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from spem.errors import ParameterError
+from spem.errors import ParameterError, require_kind
 from spem.fields.walks.killed import Walk
 
 # Rounding of the rows of a conservative walk.
@@ -25,6 +25,7 @@ def streams(n: int, rng: np.random.Generator) -> NDArray[np.uint64]:
     >>> streams(3, np.random.default_rng(0)).shape
     (3, 4)
     """
+    require_kind(rng, np.random.Generator, "make one: numpy.random.default_rng(seed)")
     return rng.integers(1, 2**64, size=(n, 4), dtype=np.uint64)
 
 
