@@ -44,7 +44,7 @@ def _record(item: Item, path: Path, results: Path) -> str:
         "claims": found["claims"],
         "tables": found["tables"],
         "numbers": _short(found["numbers"]),
-        "made": {"spem": made["spem"], "code": made["code"], "seconds": made["seconds"]},
+        "made": {"spem": made["spem"], "script": made["script"], "seconds": made["seconds"]},
     }
     text = json.dumps(kept, indent=1, ensure_ascii=False) + "\n"
     (results / f"{item.name}.json").write_text(text, encoding="utf-8")

@@ -20,7 +20,7 @@ from sphinx.util import logging
 
 from spem.paper.catalogue import ITEMS, Item, choose
 from spem.paper.data import Data
-from spem.paper.findings import Claim
+from spem.paper.findings import Claim, Table
 from spem.paper.runs import load, run
 
 # Headings of the paper; an item may belong to several sections.
@@ -106,11 +106,14 @@ def _findings(item: Item, docs: Path, runs: str) -> tuple[Mapping[str, Any], Map
     record = load(item, docs / "paper") if runs != "none" else None
     if record is not None:
         made = {"shapes": record.shapes, "claims": record.claims, "pictures": record.pictures}
+        made["tables"] = record.tables
     path = docs / "results" / f"{item.name}.json"
     if not path.is_file():
         return made, {}
     kept = json.loads(path.read_text(encoding="utf-8"))
-    return made, kept | {"claims": tuple(Claim(**claim) for claim in kept["claims"])}
+    claims = tuple(Claim(**claim) for claim in kept["claims"])
+    tables = tuple(Table(entry["caption"], entry["head"], entry["rows"]) for entry in kept.get("tables", ()))
+    return made, kept | {"claims": claims, "tables": tables}
 
 
 def item_page(item: Item, made: Mapping[str, Any], real: Mapping[str, Any]) -> str:
@@ -139,7 +142,7 @@ def _real(item: Item, real: Mapping[str, Any]) -> str:
     if facts["script"] != sha256(item.script.read_bytes()).hexdigest()[:16]:
         origin += " The script has changed since."
     numbers = json.dumps(real["numbers"], indent=1, ensure_ascii=False)
-    parts = [f"{_line(real['shapes'])} {origin}", *map(_claim, real["claims"])]
+    parts = [f"{_line(real['shapes'])} {origin}", *map(_claim, real["claims"]), *map(_rows, real["tables"])]
     if real["numbers"]:
         parts.append(
             ".. dropdown:: All figures\n\n   .. code-block:: json\n      :class: numbers\n\n"
@@ -153,7 +156,7 @@ def _synthetic(item: Item, made: Mapping[str, Any]) -> str:
     if not made:
         return "This build ran no script."
     words = f"The pictures above, and these statements, are of the reduced size. {_line(made['shapes'])}"
-    return "\n\n".join([words, *map(_claim, made["claims"])])
+    return "\n\n".join([words, *map(_claim, made["claims"]), *map(_rows, made["tables"])])
 
 
 def _claim(claim: Claim) -> str:
@@ -164,6 +167,17 @@ def _claim(claim: Claim) -> str:
     fields = "\n".join(f":{name}: {_line(value)}" for name, value in rows)
     badge = f":bdg-{BADGES[claim.verdict]}:`{claim.verdict}`"
     return f".. container:: claim\n\n   {_line(claim.statement)} {badge}\n\n{_indent(fields, 3)}"
+
+
+def _rows(table: Table) -> str:
+    """Return a table of numbers; its caption stands above it."""
+    cells = (
+        f"   {'  -' if column else '* -'} {_line(cell)}"
+        for row in (table.head, *table.rows)
+        for column, cell in enumerate(row)
+    )
+    rows = "\n".join(cells)
+    return f"{_line(table.caption)}\n\n.. list-table::\n   :header-rows: 1\n\n{rows}"
 
 
 def _script(item: Item) -> str:

@@ -236,11 +236,11 @@ def _writer(content: bytes) -> Callable[[Any], Any]:
 
 def _origin(item: Item, data: Data) -> dict[str, Any]:
     """Say what a record depends on: version, script and machinery, size and which collections are there."""
-    sources = [item.script, *sorted(Path(__file__).parent.glob("*.py"))]
-    stamp = sha256(b"\0".join(source.read_bytes() for source in sources))
+    machinery = b"\0".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
     return {
         "spem": spem.__version__,
-        "code": stamp.hexdigest()[:16],
+        "script": sha256(item.script.read_bytes()).hexdigest()[:16],
+        "machinery": sha256(machinery).hexdigest()[:16],
         "quick": data.quick,
         "data": None if data.folder is None else sorted(p.name for p in data.folder.iterdir() if p.is_dir()),
     }
