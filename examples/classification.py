@@ -12,6 +12,7 @@ SHREC'11 is classified at the two splits on which mesh networks are compared: te
 training, or sixteen, and the others for the test.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ from spem.retrieval.classification import Classification
 from spem.shapes.shape import Shape
 
 N_HARDEST, N_MISTAKES = 12, 4
+# Silhouettes and meshes of the reduced size.
+FEW = 18
 
 
 def make(data: Data) -> Finding:
@@ -34,6 +37,8 @@ def make(data: Data) -> Finding:
     count = 3 if data.quick else None
     plane = data.collection("tari1000", ndim=2, voxels=SMALL, per_class=count)
     solid = data.collection("shrec11", ndim=3, voxels=SMALL, per_class=count)
+    if data.quick:
+        plane, solid = (replace(c, items=c.items[:FEW], labels=c.labels[:FEW]) for c in (plane, solid))
     shapes, rows = classify_silhouettes(plane, quick=data.quick)
     rows |= classify_meshes(solid, quick=data.quick)
     caption = (
@@ -107,6 +112,8 @@ def hardest(shapes: list[Shape], collection: Collection, found: Classification) 
     figure = new_figure(7.2, 3.2)
     for ax, i in zip(figure.subplots(2, N_HARDEST // 2).flat, order, strict=False):
         draw_outline(shapes[i], ax)
+        # Boxes of one height, so that titles are in line.
+        ax.set_aspect("equal", adjustable="datalim")
         ax.set_title(f"{collection.labels[i]}, {100 * found.errors[i]:.0f} %", fontsize=TEXT_SIZE)
     return figure
 

@@ -285,6 +285,22 @@ def test_evaluate_scores(spem: Spem, folder: Path, codes: Path, tmp_path: Path) 
     assert "data:image/png" in page
 
 
+def test_evaluate_classifies_when_asked(spem: Spem, folder: Path, codes: Path) -> None:
+    """With --split the accuracy over splits comes beside the scores; the seed decides what it is."""
+    options = ("evaluate", codes, "--labels", folder / "labels.csv", "--split", "2", "--repeats", "3")
+    told = spem(*options)
+    assert told.exit_code == 0, told.stderr
+    assert "2 of each class for training, 3 splits" in told.stdout.splitlines()[-1]
+    first, again = (json.loads(spem(*options, "--json", "-", "--seed", "5").stdout) for _ in range(2))
+    found = first["classification"]
+    assert found == again["classification"]
+    assert (found["n_train"], found["repeats"], set(found["per_class"])) == (2, 3, set(first["per_class"]))
+    assert 0 <= found["accuracy"] <= 100
+    refused = spem("evaluate", codes, "--labels", folder / "labels.csv", "--split", "3")
+    assert refused.exit_code == 2
+    assert "expected more than the 3 for training" in refused.stderr
+
+
 def test_unlabelled_shapes_are_left_out_when_asked(
     spem: Spem, folder: Path, codes: Path, tmp_path: Path
 ) -> None:
