@@ -153,7 +153,8 @@ def _finding(folder, **made):
     origin = {"spem": "1", "script": "a", "quick": False, "data": ["tari1000"], "seconds": 1.0} | made
     claim = {"statement": "It grows.", "paper": "grows", "ours": "grows", "verdict": "holds", "note": ""}
     numbers = {"share": 0.123456789, "values": [[0.5] * 40] * 40}
-    found = {"shapes": "Hands.", "claims": [claim], "numbers": numbers, "made": origin, "pictures": ["x.png"]}
+    kept = {"shapes": "Hands.", "claims": [claim], "tables": [], "numbers": numbers}
+    found = kept | {"made": origin, "pictures": ["x.png"]}
     (folder / "fig1").mkdir(parents=True)
     (folder / "fig1" / "finding.json").write_text(json.dumps(found), encoding="utf-8")
 
@@ -164,7 +165,7 @@ def test_record_keeps_claims_and_numbers_alone(tmp_path, record):
     record.main(tmp_path / "out", tmp_path / "results")
     [path] = (tmp_path / "results").iterdir()
     kept = json.loads(path.read_text(encoding="utf-8"))
-    assert set(kept) == {"shapes", "claims", "numbers", "made"}
+    assert set(kept) == {"shapes", "claims", "tables", "numbers", "made"}
     assert kept["numbers"] == {"share": 0.12346}
     assert kept["claims"][0]["verdict"] == "holds"
 
