@@ -54,7 +54,7 @@ def test_absent_collections_are_told_in_the_report(spem, tmp_path):
     assert "not tested" in result.stdout
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "Absent collections" in page
-    assert "put it into a folder shrec11" in page
+    assert "put it into DIR/shrec11 and give --data DIR" in page
 
 
 @pytest.mark.parametrize("name", ["fig21", "tabel1", "All"])
@@ -77,6 +77,13 @@ def test_a_wrong_spem_data_is_told(spem, tmp_path, monkeypatch):
     result = spem("paper", "fig1", "--quick", "-o", tmp_path)
     assert result.exit_code == 0
     assert result.stderr.startswith("spem: SPEM_DATA: ")
+
+
+def test_a_folder_without_a_collection_is_told(spem, tmp_path):
+    """The run goes on with shapes made here."""
+    result = spem("paper", "fig4", "--quick", "--data", tmp_path, "-o", tmp_path / "out")
+    assert result.exit_code == 0
+    assert f"{tmp_path}: holds none of tari1000, shrec11, …; going on with shapes made here" in result.stderr
 
 
 def test_an_interrupted_run_says_how_to_go_on(start, tmp_path):

@@ -63,6 +63,8 @@ def paper(
     folder = _data_folder(data)
     check_folder(output)
     shapes = Data(folder, quick)
+    if folder is not None and not shapes.present:
+        complain(f"{folder}: holds none of tari1000, shrec11, …; going on with shapes made here")
     try:
         records = _run(chosen, shapes, output, again=again, quiet=json)
     except KeyboardInterrupt:

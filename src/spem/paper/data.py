@@ -104,12 +104,15 @@ class Data:
             return None
         return self.folder / name
 
+    @property
+    def present(self) -> tuple[str, ...]:
+        """Names of the collections that the folder holds."""
+        return tuple(name for name in _ORIGINS if self.find(name) is not None)
+
     def absent(self, name: str) -> str:
         """Say that a collection is absent and how to get it, for the note of a claim."""
         where = "no folder of shapes was given" if self.folder is None else f"{self.folder} has no {name}"
-        return (
-            f"{where}; {_ORIGINS[name]}, put it into a folder {name}, and name the folder above with --data"
-        )
+        return f"{where}; {_ORIGINS[name]}: put it into DIR/{name} and give --data DIR"
 
     def silhouettes(
         self, kind: Silhouette, count: int, *, inner_radius: float | None = INNER_RADIUS
