@@ -112,8 +112,8 @@ def hardest(shapes: list[Shape], collection: Collection, found: Classification) 
     figure = new_figure(7.2, 3.2)
     for ax, i in zip(figure.subplots(2, N_HARDEST // 2).flat, order, strict=False):
         draw_outline(shapes[i], ax)
-        # Boxes of one height, so that titles are in line.
-        ax.set_aspect("equal", adjustable="datalim")
+        # Boxes of several heights hang from one line, that of the titles.
+        ax.set_anchor("N")
         ax.set_title(f"{collection.labels[i]}, {100 * found.errors[i]:.0f} %", fontsize=TEXT_SIZE)
     return figure
 
