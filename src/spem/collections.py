@@ -14,7 +14,7 @@ from spem.codes.collection import encode_collection, encode_file
 from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.codes.sources import as_source, find_files, source_hash
-from spem.errors import LabelError, ParameterError, ReadError
+from spem.errors import LabelError, ParameterError, ReadError, require_kind
 from spem.retrieval.classification import Classification, classify_vectors
 from spem.retrieval.distances import correlation_distance
 from spem.retrieval.evaluation import Scores
@@ -72,6 +72,8 @@ def encode(
     if options and (settings is not None or model is not None):
         msg = f"{', '.join(options)}: a model or settings were given too; give one or the other"
         raise ParameterError(msg)
+    if model is not None:
+        require_kind(model, Model, "give the model of codes: codes.model")
     chosen = Settings.of(options) if options else settings
     given = [sources] if isinstance(sources, (str, Path, Shape)) else list(sources)
     listed: list[str | Path | Shape] = []
@@ -118,7 +120,7 @@ def search(codes: Codes | str | Path, query: str | Path | Shape, k: int | None =
 
 
 def evaluate(
-    codes: Codes | str | Path,
+    codes: Codes | ArrayLike | str | Path,
     labels: str | Path | Mapping[str, str] | Sequence[Hashable],
     *,
     ignore_unlabelled: bool = False,
@@ -128,7 +130,8 @@ def evaluate(
     Parameters
     ----------
     codes
-        Codes, or the file that holds them.
+        Codes, or the file that holds them; or ``(n, n)`` distances of any kind, queries along the rows, with
+        one label each.
     labels
         A labels file, a mapping of files to labels, or one label for each row of the codes. The shapes of
         a label volume are looked up by their names, such as ``"teeth-3"``.
@@ -139,6 +142,8 @@ def evaluate(
     ------
     LabelError
         When a shape has no label, or no class has two shapes.
+    ParameterError
+        When distances and labels do not fit.
 
     Examples
     --------
@@ -148,6 +153,8 @@ def evaluate(
     >>> spem.evaluate(codes, ["disk", "disk", "disk"]).mean()["NN"]
     100.0
     """
+    if not isinstance(codes, (Codes, str, Path)):
+        return evaluate_distances(codes, _listed(labels, "distances"))
     collection, classes = _with_classes(codes, labels, ignore_unlabelled=ignore_unlabelled)
     return evaluate_distances(correlation_distance(collection.vectors, collection.vectors), classes)
 
@@ -205,11 +212,8 @@ def classify(
     if isinstance(codes, (Codes, str, Path)):
         collection, classes = _with_classes(codes, labels, ignore_unlabelled=ignore_unlabelled)
         vectors: ArrayLike = collection.vectors
-    elif isinstance(labels, (str, Path, Mapping)):
-        msg = "vectors have no names to look labels up by; give one label for each, or codes"
-        raise LabelError(msg)
     else:
-        vectors, classes = codes, list(labels)
+        vectors, classes = codes, _listed(labels, "vectors")
     return classify_vectors(
         vectors, classes, n_train=n_train, repeats=repeats, classifier=classifier, rng=rng
     )
@@ -230,6 +234,14 @@ def row_keys(codes: Codes) -> list[str]:
     return [
         path if len(held[path]) == 1 else name for name, path in zip(codes.names, codes.paths, strict=True)
     ]
+
+
+def _listed(labels: str | Path | Mapping[str, str] | Sequence[Hashable], what: str) -> list[Hashable]:
+    """Return one label for each row of an array, which has no names."""
+    if isinstance(labels, (str, Path, Mapping)):
+        msg = f"{what} have no names to look labels up by; give one label for each, or codes"
+        raise LabelError(msg)
+    return list(labels)
 
 
 def _with_classes(
