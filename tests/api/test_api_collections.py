@@ -27,7 +27,5 @@ def test_arrays_have_no_names():
 
 def test_codes_in_place_of_their_model_are_refused():
     """With what to give."""
-    with pytest.raises(
-        ParameterError, match="expected Model, got str; give the model of codes"
-    ):
+    with pytest.raises(ParameterError, match="expected Model, got str; give the model of codes"):
         spem.encode(spem.synthetic.disk(radius=5.0, spacing=1.0), model="shapes.spem")
