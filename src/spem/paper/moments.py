@@ -19,7 +19,7 @@ from spem.fields.hyperfield import Hyperfield
 from spem.fields.operator import Boundary
 from spem.fields.rho import DEFAULT_COUNT, Scheme, sample_rho
 from spem.paper.data import INNER_RADIUS, Collection
-from spem.retrieval.classification import Classification, classify_vectors
+from spem.retrieval.classification import Classification, classify_vectors, linear_svm
 from spem.shapes.read import read
 from spem.shapes.rescale import to_inner_distance
 from spem.shapes.shape import Shape
@@ -50,6 +50,8 @@ class Reading:
         Whether the mean field is subtracted before the PCA.
     boundary
         Where the boundary lies.
+    penalty
+        Of the support vector machine: see `spem.retrieval.classification.linear_svm`.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Reading:
     scheme: Scheme = "linear"
     centred: bool = False
     boundary: Boundary = "surface"
+    penalty: float = 1.0
 
     def moments(self, fields: Sequence[Hyperfield]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the moments of silhouettes ``(n_shapes, 7)`` and of their nodal domains ``(n_shapes, 126)``.
@@ -72,7 +75,7 @@ class Reading:
         return binary, coder.fit_transform(maps)
 
 
-# The first is the one of the figure; the others change one thing each, the last several.
+# The first is the one of the figure; the others change what their names say.
 READINGS = (
     Reading(name="as in the figure"),
     Reading(name="centred maps", centred=True),
@@ -80,8 +83,10 @@ READINGS = (
     Reading(name="cut midway between clusters", at="midway"),
     Reading(name="ρ from 1 to 20, logarithmic", rho=(1.0, 20.0), scheme="log"),
     Reading(name="v = 1 on pixels", boundary="voxel"),
-    Reading(name="moments as they are", compression="none"),
     Reading(name="arsinh(h / 1e-8)", compression="arsinh"),
+    Reading(name="penalty 10 in place of 1", penalty=10.0),
+    Reading(name="moments as they are", compression="none"),
+    Reading(name="moments as they are, penalty 0.01", compression="none", penalty=0.01),
     Reading(
         name="moments as they are, cut midway, ρ from 1 to 20, logarithmic",
         compression="none",
@@ -245,8 +250,11 @@ def score_readings(
         own = fields if reading.boundary == "surface" else hyperfields(collection.items, reading.boundary)
         binary, domains = reading.moments(own)
         several = (binary, domains[:, :PER_MAP], domains[:, -PER_MAP:], domains[:, : 3 * PER_MAP], domains)
+        machine = linear_svm(penalty=reading.penalty)
         rows[reading.name] = [
-            classify_vectors(each, collection.labels, n_train=n_train, repeats=repeats).mean
+            classify_vectors(
+                each, collection.labels, n_train=n_train, repeats=repeats, classifier=machine
+            ).mean
             for each in several
         ]
     return rows

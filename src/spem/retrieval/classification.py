@@ -130,11 +130,11 @@ def classify_vectors(
     return Classification(classes, np.array(accuracies), confusion, errors, n_train)
 
 
-def linear_svm(blocks: Sequence[int] = (), *, penalty: float = 10.0) -> Any:
+def linear_svm(blocks: Sequence[int] = (), *, penalty: float = 1.0) -> Any:
     """Return a linear support vector machine on standardised entries, one class against one.
 
     Where vectors have more entries than there are training shapes, as codes have, these are told apart
-    without an error, and a larger `penalty` gives the same machine.
+    without an error, and a larger `penalty` gives the same machine. It counts where vectors are short.
 
     Parameters
     ----------
