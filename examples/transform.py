@@ -82,8 +82,8 @@ def claims(measured: dict[str, float], falls: float, times: np.ndarray) -> tuple
         judged(
             "The conductances h(x) h(y) c_xy induce the new transition probabilities (3.1).",
             "c̃_xy = h(x) h(y) c_xy",
-            f"with h = v or v^{{p_i}} nobody is killed (at most {kept:.0e} a step), with h = 1 or √v "
-            f"up to {lost:.2f}: it takes a solution of the screened equation",
+            f"with h = v or the field of a source nobody is killed (at most {kept:.0e} a step), with "
+            f"h = 1 or √v up to {lost:.2f}: it takes a solution of the screened equation",
             kept < 1e-10 < lost,
             note="The chances of a step do not add up to 1.",
         ),

@@ -8,7 +8,7 @@ boundary most walkers do, deep inside a shape that is wide compared with ρ hard
 
 Nothing but counting is needed to see that. On ten shapes, in one, two and three dimensions, walkers are let
 go and those that arrive are counted; the confidence intervals of the counts must hold what the solver says.
-Single boundary points follow: v^{p_i}(x) is the chance to arrive just there (2.2).
+Single boundary points follow: their fields say the chance to arrive just there (2.2).
 """
 
 from functools import partial
@@ -86,13 +86,13 @@ def claims(counted: dict[str, float], held: int, spent: float) -> tuple[Claim, .
             note=chance,
         ),
         judged(
-            "After a normalisation, v^{p_i}(x) is the chance that the walker from p_i arrives at x (3.1).",
+            "Normalised, the field of a source p at x is the chance that a walker from p arrives at x (3.1).",
             "one normalisation",
-            "v^{p_i}(x) goes with the time that it spends at x; that over the chance to come there differs "
+            "the field goes with the time that it spends at x; that over the chance to come there differs "
             f"between nodes by a factor of {spent:.1f}",
             spent < 1.05,
             note="The time spent is the chance to come, times how long a walker at x stays about: longer in "
-            "the middle than by the boundary. Read backwards, from x to p_i, the chance is exact.",
+            "the middle than by the boundary. Read backwards, from x to p, the chance is exact.",
         ),
     )
 

@@ -8,7 +8,8 @@ import pytest
 
 import spem
 from spem.errors import ParameterError
-from spem.paper.catalogue import ITEMS, choose
+from spem.paper.catalogue import ITEMS, Item, choose
+from spem.paper.data import Data
 
 
 def test_each_script_is_an_item_and_each_item_has_a_script():
@@ -34,3 +35,14 @@ def test_unknown_item_is_refused_with_the_nearest(name):
     """The message names the wrong word and what to do."""
     with pytest.raises(ParameterError, match=f"{name or 'an empty name'}: no such item of the paper"):
         choose(["all", name])
+
+
+def test_a_missing_script_is_told(tmp_path, monkeypatch):
+    """On one line, with what to do."""
+    monkeypatch.setattr("spem.paper.catalogue._folder", lambda: tmp_path)
+    with pytest.raises(
+        ParameterError, match=r"fig2.py: the script of fig2 cannot be read; install spem again"
+    ):
+        _ = Item("fig2", "2.2").words
+    with pytest.raises(ParameterError, match="install spem again"):
+        Item("nowhere", "2.2").make(Data())

@@ -179,7 +179,7 @@ def test_the_report_holds_everything_escaped(items, tmp_path):
     records = run([*items, broken], Data(), tmp_path / "out")
     page = write_report(tmp_path / "index.html", records).read_text(encoding="utf-8")
     assert (
-        "3 figures, tables and claims; of the statements judged: 2 holds, 2 differs, 1 could not be made"
+        "3 figures, tables and claims; of the statements judged: 2 hold, 2 differ; 1 could not be made"
         in page
     )
     assert page.count("data:image/png;base64,") == 2

@@ -46,7 +46,10 @@ class Item:
     @cached_property
     def words(self) -> tuple[str, str]:
         """Title and text of the page: the docstring of the script."""
-        document = ast.get_docstring(ast.parse(self.script.read_text(encoding="utf-8"))) or ""
+        try:
+            document = ast.get_docstring(ast.parse(self.script.read_text(encoding="utf-8"))) or ""
+        except OSError as error:
+            raise ParameterError(_unreadable(self)) from error
         title, _, rest = document.partition("\n")
         return title, rest.lstrip("=\n").strip()
 
@@ -137,10 +140,14 @@ def _load(item: Item) -> ModuleType:
     name = f"spem_paper_{item.name}"
     if name not in sys.modules:
         spec = importlib.util.spec_from_file_location(name, item.script)
-        if spec is None or spec.loader is None:
-            msg = f"{item.script}: the script of {item.name} cannot be read; install spem again"
-            raise ParameterError(msg)
+        if spec is None or spec.loader is None or not item.script.is_file():
+            raise ParameterError(_unreadable(item))
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
         sys.modules[name] = module
     return sys.modules[name]
+
+
+def _unreadable(item: Item) -> str:
+    """Say that a script is missing."""
+    return f"{item.script}: the script of {item.name} cannot be read; install spem again"

@@ -242,7 +242,7 @@ def _origin(item: Item, data: Data) -> dict[str, Any]:
         "script": sha256(item.script.read_bytes()).hexdigest()[:16],
         "machinery": sha256(machinery).hexdigest()[:16],
         "quick": data.quick,
-        "data": None if data.folder is None else sorted(p.name for p in data.folder.iterdir() if p.is_dir()),
+        "data": None if data.folder is None else list(data.present),
     }
 
 

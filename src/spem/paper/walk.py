@@ -144,8 +144,8 @@ def coverage(checks: list[Check]) -> dict[str, float]:
 def time_spent(walk: Walk, nodes: NDArray[np.int64]) -> float:
     """Return how much longer a walk stays about some nodes than about others, once it is there.
 
-    v^{p_i}(x) is, but for a constant, the time that a walk from p_i spends at x. Over this time it is the
-    chance that it comes to x at all.
+    The field of a source p at x is, but for a constant, the time that a walk from p spends there. Over
+    this time it is the chance that it comes to x at all.
 
     Parameters
     ----------
