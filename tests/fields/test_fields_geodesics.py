@@ -144,3 +144,13 @@ def test_ways_on_a_hand_are_symmetric(data_dir):
     nodes = np.random.default_rng(0).integers(0, shape.n_nodes, 6)
     between = inner_distances(shape, nodes)[:, nodes]
     assert np.abs(between - between.T).max() < 0.5 * max(shape.spacing)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 999), tall=st.floats(0.1, 8.0))
+def test_no_way_is_shorter_than_the_straight_line(seed, tall):
+    """On rough masks with flat voxels too, where second-order differences alone undershoot."""
+    mask = np.random.default_rng(seed).random((14, 12)) < 0.75
+    shape = Shape.from_mask(mask, spacing=(1.0, tall))
+    ways = inner_distances(shape, [0])[0]
+    assert (ways >= np.linalg.norm(shape.points - shape.points[0], axis=1) * (1 - 1e-12)).all()

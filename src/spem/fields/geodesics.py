@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from spem.errors import ParameterError, require_kind
 from spem.fields.boundary.sources import Sources
@@ -117,6 +118,9 @@ def _distances(
         for node, offset in zip(nodes, offsets, strict=True):
             see(index, domain.neighbours, spacing, node, offset, row)
         march(domain.neighbours, spacing, order, row)
+        # Second-order differences undershoot here and there; no way is shorter than the straight line.
+        origins = shape.points[nodes] + offsets
+        np.maximum(row, cKDTree(origins).query(shape.points)[0], out=row)
     return distance
 
 
