@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     from spem.fields.walks.killed import Walk, killed_walk
     from spem.fields.walks.paths import sample_paths
     from spem.fields.walks.transient import Transient, solve_transient
-    from spem.retrieval.classification import Classification
+    from spem.retrieval.classification import Classification, linear_svm
     from spem.retrieval.distances import correlation_distance, fuse
     from spem.retrieval.evaluation import PrecisionRecall, Scores, bulls_eye, precision_recall
     from spem.retrieval.ranking import Answer
@@ -150,6 +150,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "joint_parts",
     "killed_walk",
     "level_curvature",
+    "linear_svm",
     "maps",
     "match_nodes",
     "match_parts",
@@ -258,6 +259,7 @@ _HOME = {
     "joint_parts": "spem.decomposition.joint",
     "killed_walk": "spem.fields.walks.killed",
     "level_curvature": "spem.fields.level_curves",
+    "linear_svm": "spem.retrieval.classification",
     "maps": "spem.api.fields",
     "match_nodes": "spem.embedding.correspondence",
     "match_parts": "spem.decomposition.matching",
