@@ -63,7 +63,7 @@ def claims(angles: list[NDArray[np.float64]], spaces: list[float], inner: list[f
     words = [", ".join(f"{angle:.1f}" for angle in several) for several in angles]
     return (
         judged(
-            "Rescaled to one inner radius, the first six eigenvectors of stars come together (4.2.1, Fig. 10).",
+            "Rescaled to one inner radius, the first six eigenvectors of stars come together (Fig. 10).",
             "nearly coincide",
             f"largest angle of two stars, Φ₁ to Φ₆: {words[1]}°, from {words[0]}° on one circle",
             bool((angles[1] < angles[0] / 2).all()),
@@ -74,9 +74,9 @@ def claims(angles: list[NDArray[np.float64]], spaces: list[float], inner: list[f
             "almost identical",
             f"largest angle {angles[1].max():.1f}°; of the spaces they span {spaces[1]:.1f}°",
             bool(angles[1].max() <= IDENTICAL),
-            note=f"Almost identical is tested as: within {IDENTICAL:g}°. The stars with the fewest points, whose "
-            "core is small beside them, are farthest from the others; the size of the circle in pixels, which the "
-            "paper does not give, matters too.",
+            note=f"Almost identical is tested as: within {IDENTICAL:g}°. The stars with the fewest points, "
+            "whose core is small beside them, are farthest from the others; the circle's size in pixels, "
+            "which the paper does not give, matters too.",
         ),
         judged(
             "On one circle, the eigenvectors alter with the distances inside the stars (4.2.1, Fig. 10).",
