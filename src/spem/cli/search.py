@@ -105,32 +105,16 @@ def evaluate(
         check_target(json)
     if report is not None:
         check_folder(report)
-    from spem.codes.codes import Codes
     from spem.codes.workers import count_processes
-    from spem.collections import row_keys
     from spem.retrieval.distances import correlation_distance
-    from spem.retrieval.labels import match_labels, read_labels, unused_labels
 
-    collection, table = Codes.load(codes), read_labels(labels)
-    unused = unused_labels(row_keys(collection), table)
-    if unused:
-        complain(f"{labels}: {counted(len(unused), 'label')} without a code, such as {unused[0]}")
-    if ignore_unlabelled:
-        collection = _labelled(collection, table)
-    classes = match_labels(row_keys(collection), table)
+    collection, classes = _load_labelled(codes, labels, ignore_unlabelled=ignore_unlabelled)
     distances = correlation_distance(collection.vectors, collection.vectors)
     scores = score(distances, classes)
     facts = summary(scores)
     if split is not None:
         facts["classification"] = classification(collection, classes, split, repeats, seed)
-    if json is not None and not to_stdout:
-        write_bytes(json, (to_json(facts) + "\n").encode())
-    if to_stdout:
-        print_json(facts)
-    else:
-        print_scores(facts)
-    if json is not None and not to_stdout:
-        typer.echo(f"wrote {json}")
+    _tell(facts, json)
     if report is not None:
         from spem.cli.report import write_collection_report
 
@@ -163,6 +147,32 @@ def classification(codes: Codes, classes: list[str], n_train: int, repeats: int,
         "per_class": found.per_class(),
         "mistaken": [{"class": row, "taken_for": column, "count": n} for row, column, n in found.mistaken()],
     }
+
+
+def _load_labelled(path: Path, labels: Path, *, ignore_unlabelled: bool) -> tuple[Codes, list[str]]:
+    """Load codes with the class of each, and tell of labels that have no code."""
+    from spem.codes.codes import Codes
+    from spem.collections import row_keys
+    from spem.retrieval.labels import match_labels, read_labels, unused_labels
+
+    codes, table = Codes.load(path), read_labels(labels)
+    unused = unused_labels(row_keys(codes), table)
+    if unused:
+        complain(f"{labels}: {counted(len(unused), 'label')} without a code, such as {unused[0]}")
+    kept = _labelled(codes, table) if ignore_unlabelled else codes
+    return kept, match_labels(row_keys(kept), table)
+
+
+def _tell(facts: dict[str, Any], json: Path | None) -> None:
+    """Print the scores, or write them as JSON to standard output; and to a file where one is named."""
+    if json is not None and str(json) == "-":
+        print_json(facts)
+        return
+    if json is not None:
+        write_bytes(json, (to_json(facts) + "\n").encode())
+    print_scores(facts)
+    if json is not None:
+        typer.echo(f"wrote {json}")
 
 
 def _labelled(codes: Codes, table: dict[str, str]) -> Codes:
