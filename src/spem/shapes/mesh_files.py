@@ -15,6 +15,8 @@ from spem.shapes.limits import check_file
 
 # The counts of an OFF file stand among its first words, behind comments at most.
 _HEADER_LINES = 100
+# Bytes of a binary STL file before its faces: a title and their number.
+_STL_HEADER = 84
 
 
 def load_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -61,12 +63,25 @@ def load_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         stray = faces.max() if faces.min() >= 0 else faces.min()
         msg = f"{path}: a face names vertex {stray}, counted from 0, of {len(vertices)}; the file is damaged"
         raise ReadError(msg)
+    if path.suffix.lower() == ".stl":
+        _check_stl_count(path, len(faces))
     if not len(faces):
         msg = f"{path}: no faces in it; expected a triangle or polygon mesh"
         raise ReadError(msg)
     if path.suffix.lower() == ".off":
         _check_off_count(path, len(faces))
     return vertices, faces
+
+
+def _check_stl_count(path: Path, n_faces: int) -> None:
+    """Refuse a binary STL file with fewer faces than its header announces; an ASCII one has no count."""
+    with path.open("rb") as file:
+        header = file.read(_STL_HEADER)
+    if len(header) == _STL_HEADER and (b"\0" in header or not header.startswith(b"solid")):
+        announced = int.from_bytes(header[-4:], "little")
+        if n_faces < announced:
+            msg = f"{path}: {n_faces} of the {announced} faces of its header are there; the file is truncated"
+            raise ReadError(msg)
 
 
 def _check_off_count(path: Path, n_faces: int) -> None:
