@@ -29,8 +29,7 @@ OF_CODES: dict[str, tuple[Any, ...]] = {
 OF_FIELDS: dict[str, tuple[Any, ...]] = {
     "rho_ranges": ((0.0127, 0.127), (0.0254, 0.254), (0.05, 0.5), (0.1, 1.0), (0.0254, 0.5)),
     "n_rho": (8, 16, 32, 64, 128),
-    # With fewer, some thin meshes have no node off the boundary.
-    "voxels": (4_000, 8_000, 16_000, 32_000),
+    "voxels": (1_000, 2_000, 4_000, 8_000, 16_000, 32_000),
     "boundary": ("voxel", "surface"),
     "scheme": ("linear", "squared", "log"),
 }
@@ -40,7 +39,7 @@ WORDS = {
     "power": "α",
     "rho_ranges": "range of ρ, in sizes",
     "n_rho": "N, number of ρ",
-    "voxels": "voxels",
+    "voxels": "voxels, boundary layer kept",
     "boundary": "boundary",
     "scheme": "ρ spread",
 }

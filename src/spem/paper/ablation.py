@@ -56,6 +56,9 @@ def vary_fields(
 ) -> dict[str, Rows]:
     """Vary what needs other fields or maps; a range of ρ is given by its two ends.
 
+    With few voxels a thin shape has no node off the boundary, so the boundary layer is kept while their
+    number is varied.
+
     Parameters
     ----------
     found, settings, seeds
@@ -66,9 +69,10 @@ def vary_fields(
     results: dict[str, Rows] = {}
     for name, several in values.items():
         rows: Rows = {}
+        base = replace(settings, drop_boundary=False) if name == "voxels" else settings
         for value in several:
             ranged = name == "rho_ranges"
-            code = _changed(settings, name, (value,) if ranged else value)
+            code = _changed(base, name, (value,) if ranged else value)
             rows[f"{value[0]:g}–{value[1]:g}" if ranged else str(value)] = repeat(
                 collect(found, code), code, seeds
             )
