@@ -241,7 +241,13 @@ def _table(pages: Mapping[Item, tuple[Mapping[str, Any], Mapping[str, Any]]]) ->
 
 def _counts(verdicts: Counter[str]) -> str:
     """Return how many statements have each verdict, in words."""
-    return ", ".join(f"{verdicts[name]} {name}" for name in BADGES if verdicts[name]) or "–"
+    verbs = {"holds": "hold", "differs": "differ"}
+    counted = (
+        f"{count} {name if count == 1 else verbs.get(name, name)}"
+        for name in BADGES
+        if (count := verdicts[name])
+    )
+    return ", ".join(counted) or "–"
 
 
 def _badges(verdicts: Counter[str]) -> str:
