@@ -75,7 +75,7 @@ def make(data: Data) -> Finding:
             Picture(
                 "ablation",
                 chart(results),
-                "First tier against each parameter; bars are one deviation of seeds.",
+                "First tier against each parameter, scales apart; bars are one deviation of seeds.",
             ),
         ),
         tables=(Table(caption, ("parameter", "value", "NN", "FT", "FT, seeds"), cells),),
@@ -103,7 +103,7 @@ def chart(results: dict[str, Rows]) -> Figure:
     """Draw the first tier against each parameter, on one scale."""
     columns = min(4, len(results))
     figure = new_figure(9, 2.4 * -(-len(results) // columns))
-    axes = figure.subplots(-(-len(results) // columns), columns, squeeze=False, sharey=True).ravel()
+    axes = figure.subplots(-(-len(results) // columns), columns, squeeze=False).ravel()
     for ax, (name, rows) in zip(axes, results.items(), strict=False):
         means = [row.mean["FT"] for row in rows.values()]
         spreads = [row.deviation["FT"] for row in rows.values()]
