@@ -100,7 +100,7 @@ def test_nodal_moments_are_an_estimator():
     """Parameters are kept as they are given, names and repeats follow; unfitted it says so."""
     coder = clone(NodalMoments(compression="log", random_state=3))
     assert coder.get_params()["compression"] == "log"
-    with pytest.raises(NotFittedError):
+    with pytest.raises(NotFittedError, match="NodalMoments instance is not fitted yet"):
         coder.transform(stars())
     codes = coder.fit_transform(stars())
     assert np.array_equal(codes, clone(coder).fit_transform(stars()))

@@ -117,22 +117,26 @@ def _run(items: Sequence[Item], data: Data, output: Path, *, again: bool, quiet:
         nonlocal done
         done += 1
         bar.advance("items", done, len(items))
-        if quiet:
-            return
-        if record.failure:
-            typer.echo(f"{item.name}: could not be made: {record.failure}")
-            return
-        seconds = (record.made or {}).get("seconds", 0.0)
-        typer.echo(f"{item.name}: {item.words[0].rstrip('.')} ({'kept' if kept else f'{seconds:.1f} s'})")
-        for claim in record.claims:
-            note = f"; {claim.note}" if claim.note else ""
-            typer.echo(f"  {claim.verdict}: {claim.statement} paper: {claim.paper}; ours: {claim.ours}{note}")
+        if not quiet:
+            _tell(item, record, kept)
         if interrupts:
             raise KeyboardInterrupt
 
     with bar, _interrupts() as interrupts:
         bar.advance("items", 0, len(items))
         return run(items, data, output, again=again, tell=tell)
+
+
+def _tell(item: Item, record: Record, kept: bool) -> None:
+    """Print what an item found, or why it could not be made."""
+    if record.failure:
+        typer.echo(f"{item.name}: could not be made: {record.failure}")
+        return
+    seconds = (record.made or {}).get("seconds", 0.0)
+    typer.echo(f"{item.name}: {item.words[0].rstrip('.')} ({'kept' if kept else f'{seconds:.1f} s'})")
+    for claim in record.claims:
+        note = f"; {claim.note}" if claim.note else ""
+        typer.echo(f"  {claim.verdict}: {claim.statement} paper: {claim.paper}; ours: {claim.ours}{note}")
 
 
 @contextmanager

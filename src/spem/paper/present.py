@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -32,8 +31,7 @@ def present(make: Callable[[Data], Finding], argv: list[str] | None = None) -> F
     parser.add_argument("--data", type=Path, help="folder that holds the collections of real shapes")
     parser.add_argument("--full", action="store_true", help="the full size, in place of a quick one")
     parser.add_argument("-o", "--output", type=Path, help="folder for the pictures")
-    # A gallery runs the script inside a process whose arguments are not meant for it.
-    options = parser.parse_args(argv if argv is not None else sys.argv[1:])
+    options = parser.parse_args(argv)
     finding = make(Data(options.data, quick=not options.full))
     print(f"Shapes: {finding.shapes}")  # noqa: T201 - the script's own output
     for table in finding.tables:

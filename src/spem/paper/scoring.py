@@ -14,7 +14,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from spem.codes.bands import Bands
-from spem.codes.features import node_features, sweep_bands
+from spem.codes.kinds import shape_features
 from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.codes.sources import read_shapes
@@ -219,4 +219,4 @@ def _features(index: int, items: Sequence[Path | Shape], settings: Settings) -> 
     ((_, shape),) = read_shapes(items[index], settings)
     if isinstance(shape, SpemError):
         raise shape
-    return node_features(sweep_bands(shape, settings), settings)
+    return shape_features(shape, settings)
