@@ -49,13 +49,13 @@ $(STAMPS)/spem: pyproject.toml $(STAMPS)/venv
 	touch $@
 
 $(STAMPS)/test: $(STAMPS)/spem
-	$(BIN)/python -m pip install --quiet --group test
+	$(BIN)/python -m pip install --quiet --group test -e '.[rivals]'
 	touch $@
 
 $(STAMPS)/docs: $(STAMPS)/spem
-	$(BIN)/python -m pip install --quiet --group docs
+	$(BIN)/python -m pip install --quiet --group docs -e '.[rivals]'
 	touch $@
 
 $(STAMPS)/check: $(STAMPS)/spem
-	$(BIN)/python -m pip install --quiet --group check
+	$(BIN)/python -m pip install --quiet --group check -e '.[rivals]'
 	touch $@ $(STAMPS)/test $(STAMPS)/docs

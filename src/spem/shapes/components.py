@@ -67,6 +67,7 @@ def keep_components(shape: Shape, which: Literal["largest", "all"] = "largest") 
         cuts=Cuts(shape.cuts.voxel[hold], shape.cuts.direction[hold], shape.cuts.fraction[hold]),
         report=replace(report, volume_kept=report.volume_kept * kept).with_repair(phrase),
         affine=shape.affine,
+        surface=shape.surface,
     )
 
 

@@ -208,7 +208,13 @@ class _Filler:
                 f"left out {count_of(filling.n_reversed, 'voxel')} wound around backwards"
             )
         shape = Shape.from_mask(
-            filling.mask, steps, origin=lattice.origin, name=self.name, cuts=filling.cuts, report=report
+            filling.mask,
+            steps,
+            origin=lattice.origin,
+            name=self.name,
+            cuts=filling.cuts,
+            report=report,
+            surface=surface,
         )
         off = shape.volume / surface.volume - 1
         if surface.closed and abs(off) > _VOLUME_CHANGE:

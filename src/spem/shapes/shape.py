@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import ParameterError, ShapeError
 from spem.shapes.grids import spacing_per_axis
+from spem.shapes.surface import Surface
 
 # A cut closer to a node than this fraction of an edge is moved there: the field changes by at
 # most this fraction of its variation along one edge, and the diagonal of the operator stays finite.
@@ -138,6 +139,9 @@ class Shape:
     affine
         ``(w + 1, d + 1)`` map from array index of the *source* to the w world coordinates, or None; of a
         slice of a scan, d = 2 and w = 3.
+    surface
+        The triangle mesh that the shape was filled from, mended, in the shape's own coordinates; None where
+        there was none. `spem.shapes.boundary_surface` has a surface for every shape of three dimensions.
 
     Raises
     ------
@@ -154,6 +158,7 @@ class Shape:
     cuts: Cuts = field(default_factory=Cuts.none)
     report: Report = field(default_factory=Report)
     affine: NDArray[np.float64] | None = None
+    surface: Surface | None = None
 
     def __post_init__(self) -> None:
         d = self.mask.ndim
@@ -200,7 +205,7 @@ class Shape:
         cuts
             Cuts indexed into `mask` as given.
         **rest
-            `report` and `affine`, passed on.
+            `report`, `affine` and `surface`, passed on.
 
         Raises
         ------
