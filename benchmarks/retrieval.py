@@ -28,7 +28,7 @@ PAPER: Row = {"NN": 99.8, "FT": 97.4, "ST": 98.6, "E": 73.3, "DCG": 99.3}
 
 def main(argv: list[str] | None = None) -> None:
     benchmark = Benchmark("retrieval", str(__doc__).splitlines()[0], argv)
-    settings, root = Settings(), data_root()
+    settings, root = Settings(features="spem"), data_root()
     creatures: dict[int, tuple[Bands, ...]] = {}
     for name, ndim in COLLECTIONS.items():
         if root is None or not (root / name / "labels.csv").is_file():

@@ -21,7 +21,9 @@ from spem.retrieval.evaluation import precision_recall
 def make(data: Data) -> Finding:
     """Draw the curve of the default code and that of the code of 5.5 on the same fields."""
     found = data.collection("shrec11", ndim=3, per_class=3 if data.quick else None, voxels=1500)
-    settings = Settings(voxels=1500, n_centers=16) if data.quick else Settings()
+    settings = (
+        Settings(features="spem", voxels=1500, n_centers=16) if data.quick else Settings(features="spem")
+    )
     features = collect(found, settings)
     paper = Settings.paper(voxels=settings.voxels, boundary=settings.boundary, drop_boundary=False)
     codes = {"SPEM, default code": settings, "the code of 5.5, same fields": paper}

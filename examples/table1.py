@@ -28,7 +28,9 @@ VOXELS = 1500
 def make(data: Data) -> Finding:
     """Score the default codes, three kinds of vocabulary, and the code of 5.5 on the same fields."""
     found = data.collection("shrec11", ndim=3, per_class=3 if data.quick else None, voxels=VOXELS)
-    settings = Settings(voxels=VOXELS, n_centers=16) if data.quick else Settings()
+    settings = (
+        Settings(features="spem", voxels=VOXELS, n_centers=16) if data.quick else Settings(features="spem")
+    )
     features = collect(found, settings)
     seeds = 2 if data.quick else SEEDS
     outside = creature_features(3, 1 if data.quick else 8, settings) if found.real else ()

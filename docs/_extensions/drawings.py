@@ -109,11 +109,11 @@ def words() -> Figure:
     rng = np.random.default_rng(3)
     kinds = ("hand", "hand", "fish", "fish")
     shapes = [spem.creatures.creature(kind, voxels=5000, rng=rng) for kind in kinds]
-    model = spem.encode(shapes, n_centers=8, voxels=5000).model
+    [part] = spem.encode(shapes, features="spem", n_centers=8, voxels=5000).model.parts
     figure = new_figure(8.0, 2.4)
     for ax, shape, kind in zip(figure.subplots(1, 4), shapes, kinds, strict=True):
-        [maps] = node_features(sweep_bands(shape, model.settings), model.settings)
-        nearest = nearest_centers(model.normalisations[0].apply(maps), model.centers[0])
+        [maps] = node_features(sweep_bands(shape, part.settings), part.settings)
+        nearest = nearest_centers(part.normalisations[0].apply(maps), part.centers[0])
         picture = np.ones((*shape.mask.shape, 3))
         picture[shape.mask] = part_colours(nearest)[:, :3]
         rows, columns = shape.axes

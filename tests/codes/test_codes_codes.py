@@ -11,7 +11,7 @@ from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.errors import ModelError, ParameterError, ReadError
 
-SETTINGS = Settings(n_maps=2, n_centers=3)
+SETTINGS = Settings(features="spem", n_maps=2, n_centers=3)
 
 
 def make(names="abc", seed=0, settings=SETTINGS):
@@ -40,7 +40,7 @@ def test_other_vocabulary_is_refused():
     """Codes of another vocabulary are refused and the message says what differs."""
     with pytest.raises(ModelError, match="same settings but another vocabulary"):
         make().require_same_model(make(seed=1))
-    other = make(settings=Settings(n_maps=2, n_centers=3, power=0.75))
+    other = make(settings=Settings(features="spem", n_maps=2, n_centers=3, power=0.75))
     with pytest.raises(ModelError, match=r"the query has model .*power 0.75 against 0.5"):
         make().require_same_model(other.model)
     make().require_same_model(make("xy"))

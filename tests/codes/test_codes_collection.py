@@ -19,7 +19,7 @@ from spem.codes.workers import run_all
 from spem.errors import ModelError, ParameterError, ReadError, ShapeError
 from spem.shapes.shape import Shape
 
-SETTINGS = Settings(voxels=None, n_maps=3, n_centers=4, n_rho=16, nodes_per_shape=60)
+SETTINGS = Settings(features="spem", voxels=None, n_maps=3, n_centers=4, n_rho=16, nodes_per_shape=60)
 
 
 @pytest.fixture
@@ -172,7 +172,7 @@ def test_work_is_cleared_and_nothing_else(tmp_path: Path) -> None:
     """Work of all settings and torn files go; what somebody else put there stays, with its folders."""
     root = tmp_path / "mine"
     one = collection.Work.open(root, SETTINGS)
-    two = collection.Work.open(root, Settings())
+    two = collection.Work.open(root, Settings(features="spem"))
     for work in (one, two):
         work.save("ab", [Entry("")])
         (work.folder / ".cd.work.0123").write_bytes(b"torn")
@@ -243,7 +243,7 @@ def test_model_of_other_settings_is_refused(folder: Path) -> None:
     """Settings that contradict the model are named."""
     codes = encode_collection(find_files([folder]), SETTINGS)
     with pytest.raises(ModelError, match="n_maps 8 against 3"):
-        encode_collection(find_files([folder]), Settings(), model=codes.model)
+        encode_collection(find_files([folder]), Settings(features="spem"), model=codes.model)
 
 
 def test_codes_survive_their_file(folder: Path, tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ def hand():
 @pytest.mark.parametrize("scheme", ["linear", "log"])
 def test_bands_are_those_of_separate_sweeps(hand, scheme):
     """Bands taken from one sweep over their union are the maps of a sweep for each alone."""
-    settings = Settings(voxels=None, rho_ranges=RANGES, scheme=scheme, n_rho=20, n_maps=4)
+    settings = Settings(features="spem", voxels=None, rho_ranges=RANGES, scheme=scheme, n_rho=20, n_maps=4)
     bands = node_features(sweep_bands(hand, settings), settings)
     for (low, high), found in zip(RANGES, bands, strict=True):
         rho = sample_rho(hand.size, low * hand.size, high * hand.size, 20, scheme)
@@ -41,13 +41,16 @@ def test_bands_are_those_of_separate_sweeps(hand, scheme):
 
 def test_features_are_single_precision_over_all_nodes(hand):
     """By default there is one band of eight maps, of every node, in float32."""
-    (found,) = node_features(sweep_bands(hand, Settings()), Settings())
+    (found,) = node_features(sweep_bands(hand, Settings(features="spem")), Settings(features="spem"))
     assert (found.shape, found.dtype) == ((hand.n_nodes, 8), np.float32)
 
 
 def test_nodes_next_to_the_boundary_are_dropped_on_request(hand):
     """Without the boundary, what is left are the rows of nodes that have no boundary edge."""
-    every, some = Settings(rho_ranges=RANGES), Settings(rho_ranges=RANGES, drop_boundary=True)
+    every, some = (
+        Settings(features="spem", rho_ranges=RANGES),
+        Settings(features="spem", rho_ranges=RANGES, drop_boundary=True),
+    )
     field = sweep_bands(hand, every)
     inner = (surface_domain(hand).neighbours < hand.n_nodes).all(axis=1)
     for whole, part in zip(node_features(field, every), node_features(field, some), strict=True):
@@ -57,14 +60,14 @@ def test_nodes_next_to_the_boundary_are_dropped_on_request(hand):
 def test_a_shape_that_is_all_boundary_has_nothing_to_keep():
     """Dropping the boundary of a line of voxels says what to do."""
     line = Shape.from_mask(np.ones((9, 1)), name="line")
-    settings = Settings(drop_boundary=True)
+    settings = Settings(features="spem", drop_boundary=True)
     with pytest.raises(ShapeError, match="line: every node is next to the boundary"):
         node_features(sweep_bands(line, settings), settings)
 
 
 def test_turned_or_scaled_shape_has_the_same_code(hand):
     """A quarter turn, a reflection or another unit of length moves no code."""
-    settings = Settings(voxels=None, n_centers=16)
+    settings = Settings(features="spem", voxels=None, n_centers=16)
     original = node_features(sweep_bands(hand, settings), settings)
     model = Model.fit(settings, [original])
     plain = Shape.from_mask(hand.mask)
@@ -87,7 +90,9 @@ def test_poses_of_a_creature_find_each_other():
     """Creatures of five kinds, articulated at random: nearest ones are of the same kind."""
     kinds = ["hand", "dog", "spider", "fish", "starfish"]
     pairs = collection(n_per_class=5, kinds=kinds, voxels=1500, rng=np.random.default_rng(0))
-    found = score([shape for shape, _ in pairs], [label for _, label in pairs], Settings(voxels=None))
+    found = score(
+        [shape for shape, _ in pairs], [label for _, label in pairs], Settings(features="spem", voxels=None)
+    )
     assert found["NN"] == 100
     assert found["FT"] > 95
 
@@ -102,4 +107,7 @@ def test_default_codes_retrieve_better_than_those_of_the_paper(data_dir):
     classes = [labels[file] for file in files]
     plain = {"voxels": None, "nodes_per_shape": 100}
     paper = Settings.paper(boundary="surface", drop_boundary=False, **plain)
-    assert score(shapes, classes, Settings(**plain))["FT"] > score(shapes, classes, paper)["FT"] + 12
+    assert (
+        score(shapes, classes, Settings(features="spem", **plain))["FT"]
+        > score(shapes, classes, paper)["FT"] + 12
+    )

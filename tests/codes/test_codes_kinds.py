@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import get_args
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,9 @@ import spem
 from spem.codes.collection import encode_file
 from spem.codes.features import node_features, sweep_bands
 from spem.codes.kinds import KINDS, shape_features
-from spem.codes.settings import OWN_SETTINGS, Features, Settings
+from spem.codes.settings import Settings
 from spem.codes.spectral import shape_spectrum, spectral_features
+from spem.codes.traits import TRAITS
 from spem.embedding.signatures import heat_kernel_signature, scale_invariant_signature, shared_times
 from spem.errors import ParameterError, ShapeError
 from spem.fields.domain import surface_domain
@@ -30,12 +29,12 @@ def hand():
 
 def test_every_kind_has_a_row():
     """Words, settings and functions of the kinds are told in one order."""
-    assert tuple(KINDS) == get_args(Features) == tuple(OWN_SETTINGS)
+    assert tuple(KINDS) == tuple(TRAITS)
 
 
 def test_spem_is_what_it_was(hand):
     """The default kind are the maps of the sweep."""
-    settings = Settings(n_maps=5)
+    settings = Settings(features="spem", n_maps=5)
     (expected,) = node_features(sweep_bands(hand, settings), settings)
     np.testing.assert_array_equal(shape_features(hand, settings)[0], expected)
 

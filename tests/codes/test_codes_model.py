@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from spem.codes.settings import Settings
 from spem.codes.vlad import VLAD
 from spem.errors import ModelError, ParameterError, ReadError
 
-SETTINGS = Settings(n_maps=3, n_centers=4, rho_ranges=((0.02, 0.2), (0.1, 0.5)))
+SETTINGS = Settings(features="spem", n_maps=3, n_centers=4, rho_ranges=((0.02, 0.2), (0.1, 0.5)))
 
 
 def shapes(seed=0):
@@ -58,8 +60,8 @@ def test_digest_tells_settings_and_vocabularies_apart(model):
     """Another setting or another collection gives another digest, the same ones the same."""
     assert Model.fit(SETTINGS, shapes()).digest == model.digest
     assert Model.fit(SETTINGS, shapes(3)).digest != model.digest
-    other = Settings(n_maps=3, n_centers=4, rho_ranges=SETTINGS.rho_ranges, voxels=99)
-    assert Model(other, model.normalisations, model.centers, model.spreads).digest != model.digest
+    other = Settings(features="spem", n_maps=3, n_centers=4, rho_ranges=SETTINGS.rho_ranges, voxels=99)
+    assert Model(other, (replace(model.parts[0], settings=other),)).digest != model.digest
     assert len(model.digest) == 12
 
 
@@ -71,10 +73,13 @@ def test_maps_of_other_bands_are_refused(model):
 
 def test_arrays_must_fit_the_settings(model):
     """A model is refused whose arrays are not those of its settings."""
+    [part] = model.parts
     with pytest.raises(ModelError, match="2 bands, 4 centres and 3 maps got arrays"):
-        Model(SETTINGS, model.normalisations, (model.centers[0], model.centers[1][:2]), model.spreads)
+        replace(part, centers=(part.centers[0], part.centers[1][:2]))
     with pytest.raises(ModelError, match="got arrays"):
-        Model(SETTINGS, model.normalisations, model.centers)
+        replace(part, spreads=())
+    with pytest.raises(ModelError, match=r"a model of spem got parts spem\+spem and 1 weights"):
+        Model(SETTINGS, (part, part))
 
 
 def test_model_of_one_moment_has_no_spreads(tmp_path):
@@ -83,7 +88,7 @@ def test_model_of_one_moment_has_no_spreads(tmp_path):
     model = Model.fit(settings, shapes())
     model.save(tmp_path / "p.spem")
     loaded = Model.load(tmp_path / "p.spem")
-    assert (model.n_code, loaded.spreads, loaded.digest) == (24, (), model.digest)
+    assert (model.n_code, loaded.parts[0].spreads, loaded.digest) == (24, (), model.digest)
     np.testing.assert_array_equal(loaded.encode(shapes(1)[0]), model.encode(shapes(1)[0]))
 
 

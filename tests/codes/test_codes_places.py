@@ -21,7 +21,7 @@ def test_relative_paths_are_found_from_everywhere(tmp_path: Path, monkeypatch: p
     for n in (6, 9):
         np.save(f"shapes/{n}.npy", np.ones((n, n), bool))
     given = ("shapes/6.npy", "shapes/9.npy", "shapes/gone.npy")
-    codes = encode_collection(given, Settings(voxels=None, n_maps=2, n_centers=4))
+    codes = encode_collection(given, Settings(features="spem", voxels=None, n_maps=2, n_centers=4))
     codes.save("out/c.spem")
     again = Codes.load("out/c.spem")
     assert again.paths == given[:2]

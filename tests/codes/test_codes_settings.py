@@ -30,7 +30,7 @@ def test_settings_survive_json():
         ({"threshold": float("nan")}, "threshold=nan must be a finite number"),
         ({"threshold": "low"}, "threshold='low' must be a finite number"),
         ({"power": float("nan")}, "power=nan must be a finite number"),
-        ({"power": None}, "power=None must be a finite number"),
+        ({"power": "high"}, "power='high' must be a finite number"),
         ({"dark": "no"}, "dark='no' must be True or False"),
         ({"centred": 1}, "centred=1 must be True or False"),
         ({"n_rho": 4}, "n_maps=8 must be at most n_rho=4"),
@@ -46,11 +46,15 @@ def test_settings_survive_json():
         ({"moments": 0}, "moments=0 must be a whole number from 1 to 2"),
         ({"scheme": "cubic"}, "must be one of linear, squared, log"),
         ({"power": -0.1}, "must lie in"),
-        ({"features": "sihks"}, "features='sihks' must be one of spem, hks, si-hks, wks"),
+        ({"features": "sihks"}, "features='sihks' must be auto, or one or more of spem, hks, si-hks, wks, "),
+        ({"features": "auto+spem"}, "features='auto.spem' must be auto, or one or more of"),
+        ({"features": "spem+spem"}, "features='spem.spem' must be auto, or one or more of"),
+        ({"features": ""}, "features='' must be auto, or"),
+        ({"features": None}, "features=None must be auto, or"),
         ({"n_pairs": 0}, "n_pairs=0 must be a whole number of at least 1"),
         (
-            {"n_pairs": 50},
-            "n_pairs: a setting of features 'hks' or 'si-hks' or 'wks', not of 'spem'; leave it",
+            {"features": "spem", "n_pairs": 50},
+            "n_pairs: a setting of features 'hks' or 'si-hks' or 'wks' .*, not of 'spem'; leave it",
         ),
         ({"features": "wks", "n_rho": 32}, "n_rho: a setting of features 'spem', not of 'wks'; leave it out"),
         ({"features": "hks", "rho_ranges": ((0.1, 0.2),)}, "rho_ranges: a setting of features 'spem'"),
@@ -79,18 +83,38 @@ def test_option_that_is_no_setting_is_named():
 def test_settings_of_a_signature():
     """More values than ρ are fine, all of one band; the settings of the paper have no other kind."""
     made = Settings(features="wks", n_maps=80, n_pairs=200)
-    assert (made.n_bands, Settings(rho_ranges=((0.1, 0.2), (0.2, 0.4))).n_bands) == (1, 2)
+    two = Settings(features="spem", rho_ranges=((0.1, 0.2), (0.2, 0.4)))
+    assert (made.n_bands, two.n_bands) == (1, 2)
     assert Settings.from_json(made.to_json()) == made
     with pytest.raises(ParameterError, match=r"features='wks': the settings of 5.5 are of SPEM maps"):
         Settings.paper(features="wks")
 
 
+def test_parts_of_joined_features():
+    """Each has its kind's defaults but what was given, and the settings of other kinds as they come."""
+    joined = Settings(features="spem+surface", n_centers=32, n_pairs=50, n_rho=20)
+    spem, surface = joined.parts(3)
+    assert (spem.features, spem.n_centers, spem.n_maps, spem.n_rho, spem.n_pairs) == ("spem", 32, 8, 20, 100)
+    assert (surface.features, surface.n_centers, surface.n_pairs, surface.n_rho) == (
+        "surface-wks",
+        32,
+        50,
+        64,
+    )
+    assert joined.resolved(3) == Settings(features="spem+surface-wks", n_centers=32, n_pairs=50, n_rho=20)
+    assert Settings().resolved(4) == Settings(features="spem")
+    with pytest.raises(
+        ParameterError, match=r"'surface' are of .*3-D shapes, not of 4-D ones; take .*'spem'"
+    ):
+        joined.parts(4)
+
+
 def test_settings_of_files_from_before_a_setting_stand_at_its_default():
     """Files that know nothing of kinds hold SPEM maps; one that lacks an older setting is refused."""
-    values = Settings(n_maps=4).to_json()
+    values = Settings(features="spem", n_maps=4).to_json()
     for name in ("features", "n_pairs"):
         del values[name]
-    assert Settings.from_json(values) == Settings(n_maps=4)
+    assert Settings.from_json(values) == Settings(features="spem", n_maps=4)
     del values["n_maps"]
     with pytest.raises(ModelError, match="differs in: n_maps; make it again"):
         Settings.from_json(values)

@@ -16,6 +16,6 @@ def test_components_of_shapes_are_kept_as_the_settings_say(components, nodes):
     mask = np.zeros((5, 8), bool)
     mask[:3, :4] = True
     mask[4, 7] = True
-    settings = Settings(voxels=None, components=components)
+    settings = Settings(features="spem", voxels=None, components=components)
     [(_, shape)] = read_shapes(Shape.from_mask(mask), settings)
     assert shape.n_nodes == nodes

@@ -14,7 +14,6 @@ from spem.cli.options import (
     BoundaryChoice,
     ComponentsChoice,
     Device,
-    FeaturesChoice,
     Jobs,
     Json,
     SchemeChoice,
@@ -53,8 +52,11 @@ def encode(
         bool, typer.Option("--own-grid", help="Keep the grid of images and volumes, whatever their size.")
     ] = False,
     features: Annotated[
-        FeaturesChoice | None,
-        typer.Option(help="What is known of each node: SPEM maps, or a signature of its spectrum. [spem]"),
+        str | None,
+        typer.Option(
+            metavar="KIND[+KIND...]",
+            help="spem, surface, spem+surface, or others by name. [auto: the best for the dimension]",
+        ),
     ] = None,
     boundary: Annotated[BoundaryChoice | None, typer.Option(help="Where v = 1. [surface]")] = None,
     rho_range: Annotated[
@@ -296,6 +298,7 @@ def _settings(
 ) -> Settings | None:
     """Return the settings to encode with; a model has its own, and options must not say otherwise."""
     from spem.codes.settings import Settings
+    from spem.codes.traits import kinds_of
 
     if model is None:
         return Settings.paper(**options) if paper else Settings(**options)
@@ -304,7 +307,8 @@ def _settings(
         raise ParameterError(msg)
     for key, value in options.items():
         fixed = getattr(model.settings, key)
-        if value != fixed:
+        same = value == fixed if key != "features" else "+".join(kinds_of(value, model.ndim)) == fixed
+        if not same:
             msg = f"{key}={value}: {source} has {key}={fixed}; leave it out, or write another file"
             raise ParameterError(msg)
     return None

@@ -33,15 +33,6 @@ class SchemeChoice(StrEnum):
     log = "log"
 
 
-class FeaturesChoice(StrEnum):
-    """What is known of each node of a shape."""
-
-    spem = "spem"
-    hks = "hks"
-    si_hks = "si-hks"
-    wks = "wks"
-
-
 class ComponentsChoice(StrEnum):
     """Which connected components of a shape are kept."""
 

@@ -117,9 +117,10 @@ def _tell_missing(codes: Codes, drawn: list[bytes | None]) -> None:
 def _map_picture(codes: Codes, row: int) -> bytes | None:
     """Draw the leading maps of one shape in its first band; None where its file is gone, or no maps are."""
     source = Path(codes.paths[row])
-    if codes.model.settings.features != "spem":
+    maps = [part.settings for part in codes.model.parts if part.settings.features == "spem"]
+    if not maps:
         return None
-    settings = replace(codes.model.settings, n_maps=min(SHOWN_MAPS, codes.model.settings.n_maps))
+    settings = replace(maps[0], n_maps=min(SHOWN_MAPS, maps[0].n_maps))
     try:
         for suffix, shape in read_shapes(source, settings):
             wanted = source_name(source) + suffix == codes.names[row]

@@ -87,7 +87,7 @@ def encode_collection(
     Examples
     --------
     >>> squares = [Shape.from_mask(np.ones((n, n)), name=f"square {n}") for n in (9, 12)]
-    >>> codes = encode_collection(squares, Settings(voxels=None, n_maps=2, n_centers=4))
+    >>> codes = encode_collection(squares, Settings(features="spem", voxels=None, n_maps=2, n_centers=4))
     >>> codes.names, codes.vectors.shape
     (('square 9', 'square 12'), (2, 16))
     """
@@ -137,7 +137,8 @@ def encode_file(source: str | Path | Shape, model: Model) -> NDArray[np.float32]
     Examples
     --------
     >>> square = Shape.from_mask(np.ones((9, 9)))
-    >>> model = encode_collection([square], Settings(voxels=None, n_maps=2, n_centers=4)).model
+    >>> settings = Settings(features="spem", voxels=None, n_maps=2, n_centers=4)
+    >>> model = encode_collection([square], settings).model
     >>> encode_file(square, model).shape
     (16,)
     """
@@ -167,7 +168,7 @@ def merge(existing: Codes, new: Codes) -> Codes:
     Examples
     --------
     >>> square = Shape.from_mask(np.ones((9, 9)))
-    >>> codes = encode_collection([square], Settings(voxels=None, n_maps=2, n_centers=4))
+    >>> codes = encode_collection([square], Settings(features="spem", voxels=None, n_maps=2, n_centers=4))
     >>> len(merge(codes, codes))
     1
     """
@@ -190,7 +191,7 @@ def missing(codes: Codes, paths: Sequence[str | Path]) -> list[int]:
     Examples
     --------
     >>> square = Shape.from_mask(np.ones((9, 9)))
-    >>> codes = encode_collection([square], Settings(voxels=None, n_maps=2, n_centers=4))
+    >>> codes = encode_collection([square], Settings(features="spem", voxels=None, n_maps=2, n_centers=4))
     >>> missing(replace(codes, paths=("gone.png",)), ["."])
     [0]
     """
@@ -353,7 +354,7 @@ def _settings(settings: Settings | None, model: Model | None) -> Settings:
     """Return the settings to use; with a model they must be its own."""
     if model is None:
         return settings or Settings()
-    if settings is not None and settings != model.settings:
+    if settings is not None and settings.resolved(model.ndim) != model.settings:
         mine, theirs = settings.to_json(), model.settings.to_json()
         odd = [f"{key} {mine[key]} against {theirs[key]}" for key in mine if mine[key] != theirs[key]]
         msg = f"the vocabulary was made with other settings ({'; '.join(odd)}); leave them out"

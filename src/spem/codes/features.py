@@ -37,7 +37,7 @@ def sweep_bands(shape: Shape, settings: Settings, threads: int | None = None) ->
     Examples
     --------
     >>> from spem.shapes.synthetic import disk
-    >>> sweep_bands(disk(radius=10.0, spacing=1.0), Settings()).rho.size
+    >>> sweep_bands(disk(radius=10.0, spacing=1.0), Settings(features="spem")).rho.size
     64
     """
     low, high = (
@@ -70,7 +70,7 @@ def node_features(field: Hyperfield, settings: Settings) -> Bands:
     Examples
     --------
     >>> from spem.shapes.synthetic import disk
-    >>> settings = Settings(n_maps=4)
+    >>> settings = Settings(features="spem", n_maps=4)
     >>> field = sweep_bands(disk(radius=10.0, spacing=1.0), settings)
     >>> [block.shape[1] for block in node_features(field, settings)]
     [4]
@@ -96,7 +96,8 @@ def band_maps(field: Hyperfield, settings: Settings, band: int = 0) -> Maps:
     Examples
     --------
     >>> from spem.shapes.synthetic import disk
-    >>> band_maps(sweep_bands(disk(radius=10.0, spacing=1.0), Settings()), Settings()).rho.size
+    >>> settings = Settings(features="spem")
+    >>> band_maps(sweep_bands(disk(radius=10.0, spacing=1.0), settings), settings).rho.size
     64
     """
     size, (low, high) = field.shape.size, settings.rho_ranges[band]

@@ -7,8 +7,9 @@ from types import MappingProxyType
 
 from spem.codes.bands import Bands
 from spem.codes.features import node_features, sweep_bands
-from spem.codes.settings import Features, Settings
+from spem.codes.settings import Settings
 from spem.codes.spectral import shape_spectrum, spectral_features
+from spem.errors import ParameterError
 from spem.shapes.shape import Shape
 
 Maker = Callable[[Shape, Settings, int | None], Bands]
@@ -29,14 +30,16 @@ def shape_features(shape: Shape, settings: Settings, threads: int | None = None)
     Returns
     -------
     tuple
-        For each band ``(n_nodes, n_maps)`` in float32, over the same nodes: all, or those off the boundary.
+        For each band ``(n_nodes, n_maps)`` in float32, kind after kind; those of one kind are over the same
+        nodes, pixels or voxels (all, or those off the boundary), vertices of the surface, or points of the
+        contour.
 
     Raises
     ------
     ShapeError
         When no node is left without the boundary.
     ParameterError
-        When the shape is too small for these features.
+        When the shape is too small for these features, or there are none for its dimension.
 
     Examples
     --------
@@ -45,7 +48,12 @@ def shape_features(shape: Shape, settings: Settings, threads: int | None = None)
     >>> [shape_features(shape, Settings(features=kind))[0].shape[1] for kind in ("spem", "hks")]
     [8, 8]
     """
-    return KINDS[settings.features](shape, settings, threads)
+    try:
+        parts = settings.parts(shape.ndim)
+    except ParameterError as error:
+        msg = f"{shape.name}: {error}"
+        raise ParameterError(msg) from error
+    return tuple(band for part in parts for band in KINDS[part.features](shape, part, threads))
 
 
 def _maps(shape: Shape, settings: Settings, threads: int | None) -> Bands:
@@ -58,7 +66,7 @@ def _signatures(shape: Shape, settings: Settings, _: int | None) -> Bands:
     return spectral_features(shape_spectrum(shape, settings), settings)
 
 
-# Another kind takes a word in `settings.Features`, its own settings in `settings.OWN_SETTINGS`, a row here.
-KINDS: Mapping[Features, Maker] = MappingProxyType(
+# Another kind takes a row in `spem.codes.traits.TRAITS`, and one here.
+KINDS: Mapping[str, Maker] = MappingProxyType(
     {"spem": _maps, "hks": _signatures, "si-hks": _signatures, "wks": _signatures}
 )

@@ -3,97 +3,97 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spem.codes.arguments import whole_number
-from spem.codes.bands import as_bands
 from spem.codes.container import content_hash, read_container, write_container
-from spem.codes.normalise import Normalisation
+from spem.codes.joining import fusion_weights, join_codes
+from spem.codes.part import Part
 from spem.codes.settings import Settings
-from spem.codes.vlad import VLAD, encode
 from spem.errors import ModelError, ParameterError
+
+# Training shapes whose distances tell the weights of the parts; more move them by less than a percent.
+_WEIGHING_SHAPES = 200
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Settings, normalisations and vocabularies with their spreads.
+    """Settings, and what was learnt of each kind of features.
 
     Parameters
     ----------
     settings
-        How a file becomes a code.
-    normalisations
-        For each band what makes node features of maps.
-    centers
-        For each band ``(n_centers, n_maps)`` vocabulary.
-    spreads
-        For each band ``(n_centers, n_maps)`` mean squared difference of training nodes from their
-        centre; none with settings of one moment.
+        How a file becomes a code; its features are named kind by kind.
+    parts
+        What was learnt of each kind, in the order of the features.
+    weights
+        ``(n_parts,)`` share of each part in the correlation distance of joined codes; see `join_codes`.
     ndim
         Dimension of the shapes that it was learnt from, the only ones it codes; None where it was
         learnt from maps of unknown origin, and nothing is checked.
     """
 
     settings: Settings
-    normalisations: tuple[Normalisation, ...]
-    centers: tuple[NDArray[np.float32], ...]
-    spreads: tuple[NDArray[np.float32], ...] = ()
+    parts: tuple[Part, ...]
+    weights: tuple[float, ...] = (1.0,)
     ndim: int | None = None
 
     def __post_init__(self) -> None:
-        s = self.settings
-        shapes = [array.shape for array in self.to_arrays().values()]
-        n_bands, d = s.n_bands, s.n_maps
-        expected = [(d,), (d, d), (s.n_centers, d)] * n_bands + [(s.n_centers, d)] * n_bands * (s.moments - 1)
-        if shapes != expected:
-            msg = f"a model of {n_bands} bands, {s.n_centers} centres and {s.n_maps} maps got arrays {shapes}"
+        kinds = tuple(part.settings for part in self.parts)
+        if kinds != self.settings.parts(self.ndim) or len(self.weights) != len(kinds):
+            found = "+".join(part.settings.features for part in self.parts)
+            msg = f"a model of {self.settings.features} got parts {found} and {len(self.weights)} weights"
             raise ModelError(msg)
+        object.__setattr__(self, "weights", tuple(map(float, self.weights)))
         if self.ndim is not None:
             object.__setattr__(self, "ndim", whole_number("ndim", self.ndim))
 
     @classmethod
     def fit(cls, settings: Settings, shapes: Iterable[Any], ndim: int | None = None) -> Self:
-        """Learn normalisations and vocabularies from the maps of shapes.
+        """Learn normalisations and vocabularies from the maps of shapes, and how to weigh several kinds.
 
         Parameters
         ----------
         settings
             How the maps were made and the codes are to be.
         shapes
-            For each shape a tuple with the ``(n_nodes, n_maps)`` maps of each band; a generator
-            is read once.
+            For each shape a tuple with the ``(n_nodes, n_maps)`` maps of each band, kind after kind. Where
+            there are several kinds they are gone through more than once, and a generator is kept whole.
         ndim
             Dimension of the shapes, where it is known.
 
         Examples
         --------
         >>> rng = np.random.default_rng(0)
-        >>> settings = Settings(n_maps=2, n_centers=4)
+        >>> settings = Settings(features="spem", n_maps=2, n_centers=4)
         >>> Model.fit(settings, [rng.random((50, 2)) for _ in range(3)])
         Model(..., 1 band, 4 centres, 2 maps, codes of length 16)
         """
-        learner = VLAD(
-            settings.n_centers,
-            power=settings.power,
-            nodes_per_shape=settings.nodes_per_shape,
-            scaling=settings.scaling,
-            moments=settings.moments,
-            random_state=settings.seed,
-        ).fit(shapes)
-        centers = (words.cluster_centers_.astype(np.float32) for words in learner.vocabularies_)
-        spreads = (spread.astype(np.float32) for spread in learner.spreads_ * (settings.moments - 1))
-        return cls(settings, tuple(learner.normalisations_), tuple(centers), tuple(spreads), ndim)
+        resolved = settings.resolved(ndim)
+        chosen = resolved.parts(ndim)
+        if len(chosen) == 1:
+            return cls(resolved, (Part.fit(chosen[0], shapes),), ndim=ndim)
+        again = list(shapes) if isinstance(shapes, Iterator) else shapes
+        parts = tuple(
+            Part.fit(each, (bands[where] for bands in again))
+            for each, where in zip(chosen, _slices(chosen), strict=True)
+        )
+        unweighted = cls(resolved, parts, (1.0,) * len(parts), ndim)
+        codes = [unweighted.codes(bands) for bands in islice(again, _WEIGHING_SHAPES)]
+        weights = fusion_weights([np.stack(kind) for kind in zip(*codes, strict=True)])
+        return cls(resolved, parts, tuple(weights.tolist()), ndim)
 
     @property
     def n_code(self) -> int:
         """Length of a code."""
-        return self.settings.moments * sum(centers.size for centers in self.centers)
+        return sum(part.n_code for part in self.parts)
 
     @cached_property
     def digest(self) -> str:
@@ -139,13 +139,23 @@ class Model:
         ParameterError
             When the maps are not finite or not of the model's bands.
         """
-        bands = as_bands(maps, name)
-        found, expected = [m.shape[1] for m in bands], [words.shape[1] for words in self.centers]
-        if found != expected:
-            msg = f"{name} has {found} maps in its bands, model {self.digest} expects {expected}"
+        codes = self.codes(maps, name)
+        code = codes[0] if len(codes) == 1 else join_codes(codes, self.weights)
+        return code.astype(np.float32)
+
+    def codes(self, maps: Any, name: str = "shape") -> list[NDArray[np.float64]]:
+        """Make the code of each part apart, as `encode` takes the maps."""
+        if len(self.parts) == 1:
+            return [self.parts[0].encode(maps, name, self.digest)]
+        bands = maps if isinstance(maps, tuple) else (maps,)
+        slices = _slices([part.settings for part in self.parts])
+        if len(bands) != slices[-1].stop:
+            msg = f"{name} has {len(bands)} bands, model {self.digest} expects {slices[-1].stop}"
             raise ParameterError(msg)
-        learnt = self.normalisations, self.centers, self.settings.power, self.spreads or None
-        return encode(bands, *learnt).astype(np.float32)
+        return [
+            part.encode(bands[where], name, self.digest)
+            for part, where in zip(self.parts, slices, strict=True)
+        ]
 
     def to_header(self) -> dict[str, Any]:
         """Return the settings, and the dimension where it is known, for a file."""
@@ -154,11 +164,9 @@ class Model:
     def to_arrays(self, prefix: str = "") -> dict[str, NDArray[Any]]:
         """Return the learnt arrays by name, for a file."""
         arrays: dict[str, NDArray[Any]] = {}
-        for band, (normal, words) in enumerate(zip(self.normalisations, self.centers, strict=True)):
-            arrays[f"{prefix}mean.{band}"] = normal.mean
-            arrays[f"{prefix}transform.{band}"] = normal.transform
-            arrays[f"{prefix}centers.{band}"] = words
-        return arrays | {f"{prefix}spreads.{band}": array for band, array in enumerate(self.spreads)}
+        for part, where in zip(self.parts, _slices([each.settings for each in self.parts]), strict=True):
+            arrays |= part.to_arrays(prefix, where.start)
+        return arrays if len(self.parts) == 1 else arrays | {f"{prefix}weights": np.array(self.weights)}
 
     @classmethod
     def from_parts(
@@ -170,15 +178,14 @@ class Model:
             msg = f"{source}: the settings are no table of names and values; make it again"
             raise ModelError(msg)
         checked = Settings.from_json(values, source)
-        bands = range(checked.n_bands)
         try:
-            normalisations = tuple(
-                Normalisation(arrays[f"{prefix}mean.{band}"], arrays[f"{prefix}transform.{band}"])
-                for band in bands
+            chosen = checked.parts(header.get("ndim"))
+            parts = tuple(
+                Part.from_arrays(each, arrays, prefix, where.start)
+                for each, where in zip(chosen, _slices(chosen), strict=True)
             )
-            centers = tuple(arrays[f"{prefix}centers.{band}"] for band in bands)
-            spreads = tuple(arrays[f"{prefix}spreads.{band}"] for band in bands if checked.moments == 2)
-            return cls(checked, normalisations, centers, spreads, header.get("ndim"))
+            weights = (1.0,) if len(parts) == 1 else tuple(arrays[f"{prefix}weights"].tolist())
+            return cls(checked, parts, weights, header.get("ndim"))
         except KeyError as error:
             msg = f"{source}: the model lacks the array {error}; make it again"
             raise ModelError(msg) from error
@@ -205,7 +212,19 @@ class Model:
         return cls.from_parts(header, arrays, str(path))
 
     def __repr__(self) -> str:
-        s, n_bands = self.settings, len(self.centers)
+        if len(self.parts) > 1:
+            of = ", ".join(
+                f"{part.settings.features} {weight:.2f}"
+                for part, weight in zip(self.parts, self.weights, strict=True)
+            )
+            return f"Model({self.digest}, {of}, codes of length {self.n_code})"
+        s, n_bands = self.parts[0].settings, len(self.parts[0].centers)
         bands = f"{n_bands} band{'s' if n_bands > 1 else ''}"
-        size = f"{s.n_centers} centres, {s.n_maps} maps, codes of length {self.n_code}"
+        size = f"{s.n_centers} centres, {self.parts[0].n_values} maps, codes of length {self.n_code}"
         return f"Model({self.digest}, {bands}, {size})"
+
+
+def _slices(parts: Sequence[Settings]) -> list[slice]:
+    """Return where the bands of each part stand among those of a shape."""
+    ends = np.cumsum([part.n_bands for part in parts]).tolist()
+    return [slice(end - part.n_bands, end) for part, end in zip(parts, ends, strict=True)]

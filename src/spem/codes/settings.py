@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from importlib.metadata import version
 from typing import Any, Literal, Self, get_args
 
 from spem.codes.arguments import finite_number, truth_value, whole_number
 from spem.codes.normalise import Scaling
+from spem.codes.traits import AUTO, DEFAULTED, TRAITS, check_features, kinds_of
 from spem.errors import ModelError, ParameterError
 from spem.fields.operator import Boundary
 from spem.fields.rho import DEFAULT_COUNT, DEFAULT_RANGE, Scheme
@@ -20,19 +21,9 @@ from spem.shapes.limits import DEFAULT_VOXELS
 CODE_FORMAT = 1
 
 Components = Literal["largest", "all"]
-Features = Literal["spem", "hks", "si-hks", "wks"]
-# Settings that belong to some kinds of features alone.
-_OF_SPECTRA = ("n_pairs",)
-OWN_SETTINGS: dict[str, tuple[str, ...]] = {
-    "spem": ("rho_ranges", "scheme", "n_rho", "centred"),
-    "hks": _OF_SPECTRA,
-    "si-hks": _OF_SPECTRA,
-    "wks": _OF_SPECTRA,
-}
-# Settings that came later, with what was done before as their default: earlier files lack them.
-_ADDED = ("features", "n_pairs")
+# Settings that came later, and what files from before them mean.
+_ADDED: dict[str, Any] = {"features": "spem", "n_pairs": 100}
 _CHOICES = {
-    "features": Features,
     "boundary": Boundary,
     "scheme": Scheme,
     "components": Components,
@@ -46,7 +37,10 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     **dict.fromkeys(("threshold", "power"), finite_number),
     **dict.fromkeys(("dark", "centred", "drop_boundary"), truth_value),
 }
-_OPTIONAL = ("voxels", "threshold", "dark")
+# Settings that may be None: no value, or, of settings for several kinds, the default of each.
+_OPTIONAL = ("voxels", "threshold", "dark", *DEFAULTED)
+# Filled with the default of a kind where there is one; settings for several leave it to their parts.
+_EACH_OWN: Any = None
 # What a file says about itself.
 _OF_FILES = ("code_format", "spem_version")
 
@@ -67,8 +61,9 @@ class Settings:
     components
         Whether the largest component of a shape is kept or all.
     features
-        What is known of each node: ``"spem"``, its SPEM maps; or a signature from the spectrum of the shape,
-        ``"hks"`` of the heat kernel, ``"si-hks"`` of it but invariant to scale, ``"wks"`` of the wave kernel.
+        What codes are made of: ``"spem"``, the maps; ``"surface"``, the best known signature of the surface
+        of a solid; both joined, ``"spem+surface"``; or any kinds of `spem.codes.traits.TRAITS` joined by
+        ``+``. ``"auto"`` takes what is best for the dimension of the shapes.
     boundary
         Where the boundary lies: ``"surface"`` at the cuts, ``"voxel"`` as in the paper.
     rho_ranges
@@ -80,7 +75,8 @@ class Settings:
     n_pairs
         Number of eigenpairs that signatures are made of.
     n_maps
-        Number of projections taken from each band; of times, frequencies or energies of a signature.
+        Number of projections taken from each band; of times, frequencies or energies of a signature. This,
+        `n_centers`, `power`, `scaling` and `moments` are each kind's own where they are None.
     centred
         Whether the mean field is subtracted before the PCA.
     drop_boundary
@@ -112,19 +108,19 @@ class Settings:
     threshold: float | None = None
     dark: bool | None = None
     components: Components = "largest"
-    features: Features = "spem"
+    features: str = AUTO
     boundary: Boundary = "surface"
     rho_ranges: tuple[tuple[float, float], ...] = (DEFAULT_RANGE,)
     scheme: Scheme = "linear"
     n_rho: int = DEFAULT_COUNT
     n_pairs: int = 100
-    n_maps: int = 8
+    n_maps: int = _EACH_OWN
     centred: bool = False
     drop_boundary: bool = False
-    n_centers: int = 64
-    power: float = 0.5
-    scaling: Scaling = "standard"
-    moments: int = 2
+    n_centers: int = _EACH_OWN
+    power: float = _EACH_OWN
+    scaling: Scaling = _EACH_OWN
+    moments: int = _EACH_OWN
     nodes_per_shape: int = 500
     seed: int = 0
     code_format: int = CODE_FORMAT
@@ -132,39 +128,83 @@ class Settings:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rho_ranges", _as_ranges(self.rho_ranges))
+        traits = TRAITS.get(check_features(self.features))
+        for name, value in traits.defaults.items() if traits else ():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, value)
         for name, check in _CHECKS.items():
             value = getattr(self, name)
             if value is not None or name not in _OPTIONAL:
                 object.__setattr__(self, name, check(name, value))
         for name, kind in _CHOICES.items():
-            if getattr(self, name) not in get_args(kind):
+            if getattr(self, name) not in (*get_args(kind), *((None,) if name in _OPTIONAL else ())):
                 msg = f"{name}={getattr(self, name)!r} must be one of {', '.join(get_args(kind))}"
                 raise ParameterError(msg)
         if self.code_format != CODE_FORMAT:
             msg = f"code_format={self.code_format!r}: this spem makes format {CODE_FORMAT}; leave it out"
             raise ParameterError(msg)
-        if not 0 <= self.power <= 1:
+        if not 0 <= (self.power or 0.0) <= 1:
             msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"
             raise ParameterError(msg)
-        self._check_kind()
-        if self.features == "spem" and self.n_maps > self.n_rho:
-            msg = f"n_maps={self.n_maps} must be at most n_rho={self.n_rho}, the number of ρ in each range"
+        self._check_kinds()
+        n_maps = self.n_maps or TRAITS["spem"].defaults["n_maps"]
+        if {"spem", AUTO} & set(self.features.split("+")) and n_maps > self.n_rho:
+            msg = f"n_maps={n_maps} must be at most n_rho={self.n_rho}, the number of ρ in each range"
             raise ParameterError(msg)
 
-    def _check_kind(self) -> None:
-        """Refuse settings that have no meaning for this kind of features."""
-        own = OWN_SETTINGS[self.features]
+    def _check_kinds(self) -> None:
+        """Refuse settings that have no meaning for these kinds of features."""
+        words = self.features.split("+")
+        if not set(words) <= set(TRAITS):
+            return
         for entry in fields(self):
-            kinds = [kind for kind, names in OWN_SETTINGS.items() if entry.name in names]
-            if kinds and entry.name not in own and getattr(self, entry.name) != entry.default:
+            kinds = [kind for kind, traits in TRAITS.items() if entry.name in traits.own]
+            if kinds and not set(kinds) & set(words) and getattr(self, entry.name) != entry.default:
                 of = " or ".join(map(repr, kinds))
                 msg = f"{entry.name}: a setting of features {of}, not of {self.features!r}; leave it out"
                 raise ParameterError(msg)
 
+    def parts(self, ndim: int | None = None) -> tuple[Self, ...]:
+        """Return settings for each kind of features alone, with the defaults of that kind.
+
+        Parameters
+        ----------
+        ndim
+            Dimension of the shapes, where features depend on it.
+
+        Raises
+        ------
+        ParameterError
+            When shapes of this dimension have no such features.
+
+        Examples
+        --------
+        >>> [part.features for part in Settings(n_centers=32).parts(3)]
+        ['spem', 'surface-wks']
+        """
+        return tuple(self._of_kind(kind) for kind in kinds_of(self.features, ndim))
+
+    def resolved(self, ndim: int | None) -> Self:
+        """Return the same settings with the kinds by name that the features stand for.
+
+        Examples
+        --------
+        >>> Settings().resolved(3).features
+        'spem+surface-wks'
+        """
+        kinds = kinds_of(self.features, ndim)
+        return self._of_kind(*kinds) if len(kinds) == 1 else replace(self, features="+".join(kinds))
+
+    def _of_kind(self, kind: str) -> Self:
+        """Return settings of one kind, those of other kinds at their defaults."""
+        foreign = {name for traits in TRAITS.values() for name in traits.own} - set(TRAITS[kind].own)
+        kept: dict[str, Any] = {entry.name: entry.default for entry in fields(self) if entry.name in foreign}
+        return replace(self, features=kind, **kept)
+
     @property
     def n_bands(self) -> int:
-        """Number of arrays of features that a shape has: one a range of ρ, one of a signature."""
-        return len(self.rho_ranges) if "rho_ranges" in OWN_SETTINGS[self.features] else 1
+        """Number of arrays of features of a shape, of settings of one kind: one a range of ρ, else one."""
+        return len(self.rho_ranges) if "rho_ranges" in TRAITS[self.features].own else 1
 
     @classmethod
     def of(cls, options: Mapping[str, Any]) -> Self:
@@ -203,6 +243,7 @@ class Settings:
             msg = f"features={changes['features']!r}: the settings of 5.5 are of SPEM maps; leave one out"
             raise ParameterError(msg)
         chosen: dict[str, Any] = {
+            "features": "spem",
             "voxels": 250_000,
             "boundary": "voxel",
             "rho_ranges": ((0.0254, 0.254),),
@@ -242,9 +283,10 @@ class Settings:
             made = values.get("spem_version", "unknown")
             msg = f"{source}: codes of format {found} (spem {made}), this spem makes {CODE_FORMAT}; {advice}"
             raise ModelError(msg)
+        values = _ADDED | dict(values)
         known = {entry.name for entry in fields(cls)}
-        if not known - set(_ADDED) <= set(values) <= known:
-            odd = ", ".join(sorted((set(values) ^ known) - set(_ADDED)))
+        if set(values) != known:
+            odd = ", ".join(sorted(set(values) ^ known))
             msg = f"{source}: settings do not fit this spem, which differs in: {odd}; make it again"
             raise ModelError(msg)
         try:

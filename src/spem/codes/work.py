@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -124,14 +125,32 @@ class Work:
             for i, (suffix, reason, ndim, count) in enumerate(header["shapes"])
         ]
 
-    def features(self, keys: list[str], limit: int) -> Iterator[tuple[NDArray[Any], ...]]:
-        """Yield the node features of the sources, at most `limit` shapes."""
-        left = limit
-        for key in keys:
-            for entry in self.load(key):
-                if entry.arrays and left > 0:
-                    left -= 1
-                    yield entry.arrays
+    def features(self, keys: list[str], limit: int) -> WorkFeatures:
+        """Return the node features of the sources, of at most `limit` shapes."""
+        return WorkFeatures(self, tuple(keys), limit)
+
+
+@dataclass(frozen=True)
+class WorkFeatures:
+    """Node features in a work folder, read shape by shape each time they are gone through.
+
+    Parameters
+    ----------
+    work
+        The folder.
+    keys
+        Sources, in order.
+    limit
+        Most shapes.
+    """
+
+    work: Work
+    keys: tuple[str, ...]
+    limit: int
+
+    def __iter__(self) -> Iterator[tuple[NDArray[Any], ...]]:
+        entries = (entry for key in self.keys for entry in self.work.load(key) if entry.arrays)
+        return (entry.arrays for entry in islice(entries, self.limit))
 
 
 def clear_work(root: str | Path) -> None:
@@ -148,7 +167,7 @@ def clear_work(root: str | Path) -> None:
     --------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = Work.open(Path(folder, "work"), Settings())
+    ...     _ = Work.open(Path(folder, "work"), Settings(features="spem"))
     ...     clear_work(Path(folder, "work"))
     ...     Path(folder, "work").exists()
     False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +53,8 @@ def classify_silhouettes(found: Collection, *, quick: bool) -> tuple[list[Shape]
     >>> len(classify_silhouettes(few, quick=True)[1])
     3
     """
-    settings = Settings(voxels=SMALL, n_centers=16) if quick else Settings(voxels=PIXELS)
+    settings = Settings(features="spem", voxels=PIXELS)
+    settings = replace(settings, voxels=SMALL, n_centers=16) if quick else settings
     bands, fields = features_of(found.items, settings), hyperfields(found.items)
     maps = maps_over(fields)
     own = words(bands, bands, settings), NodalMoments(random_state=0).fit_transform(maps)
@@ -81,7 +83,7 @@ def classify_meshes(found: Collection, *, quick: bool) -> dict[str, Classificati
     >>> list(classify_meshes(few, quick=True))
     ['meshes, 10 for training', 'meshes, 16 for training']
     """
-    settings = Settings(voxels=SMALL, n_centers=16) if quick else Settings()
+    settings = Settings(features="spem", voxels=SMALL, n_centers=16) if quick else Settings(features="spem")
     bands = features_of(found.items, settings)
     outside = creature_features(3, 1 if quick else EACH, settings) if found.real else bands
     codes = words(bands, outside, settings)
@@ -101,7 +103,7 @@ def words(bands: Sequence[Bands], training: Sequence[Bands], settings: Settings)
     Examples
     --------
     >>> bands = [(np.random.default_rng(seed).random((20, 8)),) for seed in range(3)]
-    >>> words(bands, bands, Settings(n_centers=4)).shape
+    >>> words(bands, bands, Settings(features="spem", n_centers=4)).shape
     (3, 64)
     """
     model = Model.fit(settings, training)

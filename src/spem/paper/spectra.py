@@ -147,7 +147,7 @@ def kind_settings(kind: Kind, count: int, *, voxels: int, n_pairs: int, n_center
     >>> kind_settings("wks", 4, voxels=900, n_pairs=50).n_pairs
     50
     """
-    settings = Settings(n_maps=count, voxels=voxels, n_centers=n_centers)
+    settings = Settings(features="spem", n_maps=count, voxels=voxels, n_centers=n_centers)
     return settings if kind == "spem" else replace(settings, features=kind, n_pairs=n_pairs)
 
 
@@ -209,7 +209,7 @@ def _made(
     index: int, items: Sequence[Path | Shape], counts: tuple[int, ...], voxels: int, n_pairs: int
 ) -> Made:
     """Compute the features of one item."""
-    ((_, shape),) = read_shapes(items[index], Settings(voxels=voxels))
+    ((_, shape),) = read_shapes(items[index], Settings(features="spem", voxels=voxels))
     if isinstance(shape, SpemError):
         raise shape
     return _all_kinds(shape, counts, voxels, n_pairs)

@@ -59,7 +59,8 @@ def rank(query: ArrayLike, codes: Codes, k: int | None = 10) -> list[Answer]:
     >>> from spem.codes.model import Model
     >>> from spem.codes.settings import Settings
     >>> rng = np.random.default_rng(0)
-    >>> model = Model.fit(Settings(n_maps=2, n_centers=4), [rng.random((50, 2)) for _ in range(3)])
+    >>> settings = Settings(features="spem", n_maps=2, n_centers=4)
+    >>> model = Model.fit(settings, [rng.random((50, 2)) for _ in range(3)])
     >>> vectors = np.eye(2, model.n_code)
     >>> codes = Codes(("a", "b"), ("a.png", "b.png"), ("0", "1"), vectors, model)
     >>> [(answer.rank, answer.name) for answer in rank(vectors[1], codes)]

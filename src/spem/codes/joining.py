@@ -1,0 +1,115 @@
+"""Codes of several kinds in one vector, whose correlation distance is the weighted sum of theirs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spem.errors import ParameterError
+
+# A code whose deviation from its mean is below this part of its length is constant to rounding.
+_CONSTANT = 1e-13
+
+
+def join_codes(codes: Sequence[ArrayLike], weights: ArrayLike | None = None) -> NDArray[np.float64]:
+    """Put codes of several kinds side by side, so that their correlation distances add up.
+
+    Each code x is brought to mean zero and unit length and multiplied by √w, w being its share of the sum of
+    the weights. The whole has mean zero and unit length, and of two shapes
+
+        1 − corr([x; y], [x'; y']) = w (1 − corr(x, x')) + (1 − w) (1 − corr(y, y')).
+
+    Parameters
+    ----------
+    codes
+        For each kind ``(n_code,)`` the code of one shape, or ``(n_shapes, n_code)`` those of many.
+    weights
+        One number of at least 0 for each kind; equal by default.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(n_joined,)`` or ``(n_shapes, n_joined)``. A code that is constant gives zeros.
+
+    Raises
+    ------
+    ParameterError
+        When there is none, they differ in their shapes, or weights do not fit.
+
+    Examples
+    --------
+    >>> join_codes([[1.0, 0.0], [2.0, 0.0, 1.0]]).round(3)
+    array([ 0.5, -0.5,  0.5, -0.5,  0. ])
+    """
+    arrays = [np.asarray(code, np.float64) for code in codes]
+    if not arrays or len({array.shape[:-1] for array in arrays}) != 1 or arrays[0].ndim not in (1, 2):
+        found = ", ".join(str(array.shape) for array in arrays) or "none"
+        msg = f"codes to join have shapes {found}; give (n_code,) or (n_shapes, n_code) of the same shapes"
+        raise ParameterError(msg)
+    shares = _shares(weights, len(arrays))
+    together = zip(shares, arrays, strict=True)
+    return np.concatenate([np.sqrt(share) * _standardised(array) for share, array in together], axis=-1)
+
+
+def fusion_weights(codes: Sequence[ArrayLike]) -> NDArray[np.float64]:
+    """Weigh kinds of codes by how far apart they hold the same shapes; no label enters.
+
+    The weight of a kind is the inverse of the standard deviation of its correlation distances, so that in
+    their sum no kind drowns another because its distances spread more.
+
+    Parameters
+    ----------
+    codes
+        For each kind ``(n_shapes, n_code)`` codes of the same shapes.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(n_kinds,)`` weights that sum to one; equal where distances of a kind do not differ.
+
+    Raises
+    ------
+    ParameterError
+        When there is none.
+
+    Examples
+    --------
+    >>> near, far = np.eye(3) + [1, 0, 0], [[1, 0, 0], [0.9, 0, 1], [0, 1, 0]]
+    >>> fusion_weights([far, far])
+    array([0.5, 0.5])
+    """
+    if not len(codes):
+        msg = "no codes to weigh; give those of each kind"
+        raise ParameterError(msg)
+    spreads = np.array([_spread(np.asarray(kind, np.float64)) for kind in codes])
+    if not (spreads > 0).all():
+        return np.full(len(spreads), 1 / len(spreads))
+    return np.asarray((1 / spreads) / (1 / spreads).sum())
+
+
+def _spread(codes: NDArray[np.float64]) -> float:
+    """Return the standard deviation of the correlation distances between different shapes."""
+    unit = _standardised(codes)
+    pairs = (unit @ unit.T)[np.triu_indices(len(unit), 1)]
+    return float(pairs.std()) if pairs.size else 0.0
+
+
+def _standardised(codes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bring codes to mean zero and unit length; constant ones to zeros."""
+    centred = codes - codes.mean(axis=-1, keepdims=True)
+    length = np.linalg.norm(centred, axis=-1, keepdims=True)
+    varied = length > _CONSTANT * np.linalg.norm(codes, axis=-1, keepdims=True)
+    return np.asarray(np.where(varied, centred / np.where(varied, length, 1.0), 0.0))
+
+
+def _shares(weights: ArrayLike | None, count: int) -> NDArray[np.float64]:
+    """Return weights that sum to one."""
+    if weights is None:
+        return np.full(count, 1 / count)
+    given = np.asarray(weights, np.float64)
+    if given.shape != (count,) or not np.isfinite(given).all() or (given < 0).any() or not given.sum() > 0:
+        msg = f"weights={weights!r}: expected {count} numbers of at least 0, one a kind, not all 0"
+        raise ParameterError(msg)
+    return np.asarray(given / given.sum())

@@ -1,0 +1,106 @@
+"""What a model has learnt of one kind of node features, and the code that it makes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.codes.bands import Bands, as_bands
+from spem.codes.normalise import Normalisation
+from spem.codes.settings import Settings
+from spem.codes.vlad import VLAD, encode
+from spem.errors import ModelError, ParameterError
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Normalisations and vocabularies with their spreads, of one kind of features.
+
+    Parameters
+    ----------
+    settings
+        Settings of this kind alone.
+    normalisations
+        For each band what makes node features of maps.
+    centers
+        For each band ``(n_centers, n_maps)`` vocabulary.
+    spreads
+        For each band ``(n_centers, n_maps)`` mean squared difference of training nodes from their
+        centre; none with settings of one moment.
+    """
+
+    settings: Settings
+    normalisations: tuple[Normalisation, ...]
+    centers: tuple[NDArray[np.float32], ...]
+    spreads: tuple[NDArray[np.float32], ...] = ()
+
+    def __post_init__(self) -> None:
+        s = self.settings
+        shapes = [array.shape for array in self.to_arrays("", 0).values()]
+        n_bands, d, k = s.n_bands, self.n_values, s.n_centers
+        expected = [(d,), (d, d), (k, d)] * n_bands + [(k, d)] * n_bands * (s.moments - 1)
+        if shapes != expected:
+            msg = f"a model of {n_bands} bands, {k} centres and {s.n_maps} maps got arrays {shapes}"
+            raise ModelError(msg)
+
+    @classmethod
+    def fit(cls, settings: Settings, shapes: Iterable[Bands]) -> Self:
+        """Learn from the features of shapes, for each a tuple of ``(n_nodes, n_values)`` a band."""
+        learner = VLAD(
+            settings.n_centers,
+            power=settings.power,
+            nodes_per_shape=settings.nodes_per_shape,
+            scaling=settings.scaling,
+            moments=settings.moments,
+            random_state=settings.seed,
+        ).fit(shapes)
+        centers = (words.cluster_centers_.astype(np.float32) for words in learner.vocabularies_)
+        spreads = (spread.astype(np.float32) for spread in learner.spreads_ * (settings.moments - 1))
+        return cls(settings, tuple(learner.normalisations_), tuple(centers), tuple(spreads))
+
+    @property
+    def n_values(self) -> int:
+        """Number of values a node."""
+        return len(self.normalisations[0].mean) if self.normalisations else 0
+
+    @property
+    def n_code(self) -> int:
+        """Length of a code."""
+        return self.settings.moments * sum(centers.size for centers in self.centers)
+
+    def encode(self, bands: Any, name: str, model: str) -> NDArray[np.float64]:
+        """Make the code ``(n_code,)`` of the bands of this kind; `name` and `model` are for messages."""
+        checked = as_bands(bands, name)
+        found, expected = [m.shape[1] for m in checked], [words.shape[1] for words in self.centers]
+        if found != expected:
+            msg = f"{name} has {found} maps in its bands, model {model} expects {expected}"
+            raise ParameterError(msg)
+        learnt = self.normalisations, self.centers, self.settings.power, self.spreads or None
+        return encode(checked, *learnt)
+
+    def to_arrays(self, prefix: str, first: int) -> dict[str, NDArray[Any]]:
+        """Return the learnt arrays by name, bands being numbered from `first`."""
+        arrays: dict[str, NDArray[Any]] = {}
+        for band, (normal, words) in enumerate(zip(self.normalisations, self.centers, strict=True), first):
+            arrays[f"{prefix}mean.{band}"] = normal.mean
+            arrays[f"{prefix}transform.{band}"] = normal.transform
+            arrays[f"{prefix}centers.{band}"] = words
+        return arrays | {f"{prefix}spreads.{band}": each for band, each in enumerate(self.spreads, first)}
+
+    @classmethod
+    def from_arrays(
+        cls, settings: Settings, arrays: Mapping[str, NDArray[Any]], prefix: str, first: int
+    ) -> Self:
+        """Make a part of what `to_arrays` gave."""
+        bands = range(first, first + settings.n_bands)
+        normalisations = tuple(
+            Normalisation(arrays[f"{prefix}mean.{band}"], arrays[f"{prefix}transform.{band}"])
+            for band in bands
+        )
+        centers = tuple(arrays[f"{prefix}centers.{band}"] for band in bands)
+        spreads = tuple(arrays[f"{prefix}spreads.{band}"] for band in bands if settings.moments == 2)
+        return cls(settings, normalisations, centers, spreads)
