@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import get_args
 
 import numpy as np
 import scipy.sparse.linalg
@@ -19,7 +18,7 @@ import spem
 from _shapes import ball
 from _table import Benchmark, Row, alternating, compile_kernels, slope
 from spem.codes.kinds import shape_features
-from spem.codes.settings import Features, Settings
+from spem.codes.settings import Settings
 from spem.fields.operator import System, assemble
 from spem.fields.solvers.direct import Direct
 from spem.fields.spectrum import free_system
@@ -28,6 +27,7 @@ from spem.shapes.shape import Shape
 
 TOLERANCE = 1e-6
 RATIO_LIMIT, ORDER_LIMIT = 0.6, 1.9
+KINDS = ("spem", "hks", "si-hks", "wks")
 SUPERLU_NODES = 6000  # above, SuperLU takes the time of all others together
 
 Pairs = tuple[np.ndarray, np.ndarray]
@@ -133,7 +133,7 @@ def features(benchmark: Benchmark) -> None:
     """Time the features of each kind, from shape to nodes."""
     rows = []
     for name, shape in shapes(benchmark.quick).items():
-        calls = {kind: partial(shape_features, shape, Settings(features=kind)) for kind in get_args(Features)}
+        calls = {kind: partial(shape_features, shape, Settings(features=kind)) for kind in KINDS}
         seconds = alternating(calls, 3)
         rows.append({"shape": name, "nodes": shape.n_nodes} | {f"{k}, s": v for k, v in seconds.items()})
     benchmark.table("node features", rows)

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spem.codes.bands import Bands
 from spem.codes.kinds import shape_features
-from spem.codes.settings import Features as Kind
 from spem.codes.settings import Settings
 from spem.codes.sources import read_shapes
 from spem.codes.spectral import shape_spectrum, spectral_features
@@ -27,6 +26,7 @@ from spem.shapes.shape import Shape
 _NESTED = ("spem", "si-hks")
 _CONSTANT = 1e-5
 
+Kind = Literal["spem", "hks", "si-hks", "wks"]
 Made = dict[tuple[Kind, int], Bands]
 
 
