@@ -41,7 +41,8 @@ def contour_ways(points: ContourPoints) -> tuple[Array, NDArray[np.int32]]:
     2.0
     """
     length, first = _sight(points.position, points.onward)
-    return _shortest(length, first, _bends(points))
+    _shorten(length, first, _bends(points))
+    return length, first
 
 
 def _bends(points: ContourPoints) -> NDArray[np.int64]:
@@ -68,8 +69,8 @@ def _opens(p: Array, at: int, after: int, before: int, to: int) -> bool:
     dx, dy = p[to, 0] - p[at, 0], p[to, 1] - p[at, 1]
     left, right = _turn(ax, ay, dx, dy), _turn(dx, dy, bx, by)
     if _turn(ax, ay, bx, by) > 0:
-        return left >= 0 and right >= 0
-    return left >= 0 or right >= 0
+        return bool(left >= 0 and right >= 0)
+    return bool(left >= 0 or right >= 0)
 
 
 @njit(cache=True, nogil=True)
@@ -118,9 +119,7 @@ def _sight(p: Array, onward: NDArray[np.int32]) -> tuple[Array, NDArray[np.int32
 
 
 @njit(cache=True, nogil=True)
-def _shortest(
-    length: Array, first: NDArray[np.int32], bends: NDArray[np.int64]
-) -> tuple[Array, NDArray[np.int32]]:
+def _shorten(length: Array, first: NDArray[np.int32], bends: NDArray[np.int64]) -> None:
     """Shorten ways over each bend in turn (Floyd and Warshall), in place."""
     n = len(length)
     for k in bends:
@@ -132,4 +131,3 @@ def _shortest(
                 if start + length[k, j] < length[i, j]:
                     length[i, j] = start + length[k, j]
                     first[i, j] = first[i, k]
-    return length, first

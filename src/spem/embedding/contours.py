@@ -139,7 +139,7 @@ def _shares(lengths: NDArray[np.float64], n_points: int) -> NDArray[np.int64]:
     counts[counts < _LEAST] = 0
     longest = int(lengths.argmax())
     counts[longest] += n_points - counts.sum()
-    return counts
+    return np.asarray(counts)
 
 
 def _spread(

@@ -62,8 +62,8 @@ def shape_context(
     Returns
     -------
     NDArray
-        ``(n_points, n_radii * n_angles)`` shares of the other points, by distance, then direction; rows add up
-        to 1.
+        ``(n_points, n_radii * n_angles)`` shares of the other points, by distance, then direction; rows add
+        up to 1.
 
     Raises
     ------
