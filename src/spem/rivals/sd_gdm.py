@@ -1,0 +1,199 @@
+"""SD-GDM: the spectrum of the matrix of geodesic distances between points of the surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigvalsh
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import eigsh
+
+from spem.errors import ShapeError
+from spem.rivals.extra import require
+from spem.shapes.shape import Shape
+from spem.shapes.surface import Surface
+
+Array = NDArray[np.float64]
+# Below this many points the whole spectrum costs less than part of it by Lanczos.
+_DENSE = 500
+
+
+@dataclass(frozen=True)
+class SDGDM:
+    """Largest singular values of the geodesic distance matrix, compared by relative differences.
+
+    The publication: D. Smeets, J. Hermans, D. Vandermeulen, P. Suetens, "Isometric deformation invariant 3D
+    shape recognition", Pattern Recognition 45 (2012) 2817-2831; before it D. Smeets, T. Fabry, J. Hermans,
+    D. Vandermeulen, P. Suetens, "Inelastic deformation invariant modal representation for non-rigid 3D object
+    recognition", AMDO 2010. Its run in Table 1 is that of Lian et al., SHREC'11.
+
+    Deviations: distances by the heat method (Crane, Weischedel, Wardetzky 2013), in place of fast marching,
+    whose errors on large triangles depend on the pose. Each point weighs its share of the surface's area, so
+    that the matrix stands for an integral operator and its values depend on the surface, not on where its
+    points lie; lengths are in units of the square root of the area, since a collection may hold its shapes at
+    any scale. Fifty values, where the first publication has nineteen: chosen by score on SHREC'11. Vertices are
+    the points where there are no more than `samples`, farthest points otherwise.
+
+    Time: 20 ms a mesh of 250 vertices on one core; with 2,500 points of a mesh of 8,400 vertices some 15 s.
+
+    Parameters
+    ----------
+    n_values
+        Number of singular values; fewer where there are fewer points.
+    samples
+        Largest number of points.
+
+    Examples
+    --------
+    >>> SDGDM().compare([np.array([3.0, 1.0]), np.array([3.0, 3.0])])
+    array([[0. , 0.5],
+           [0.5, 0. ]])
+    """
+
+    n_values: int = 50
+    samples: int = 2500
+
+    @property
+    def name(self) -> str:
+        """Name in tables."""
+        return "SD-GDM"
+
+    def describe(self, shape: Shape) -> Array:
+        """Compute the largest singular values of the distances over the surface.
+
+        Parameters
+        ----------
+        shape
+            A shape of three dimensions.
+
+        Returns
+        -------
+        numpy.ndarray
+            ``(n_values,)`` values, largest first, in units of the square root of the surface's area.
+
+        Raises
+        ------
+        MissingExtraError
+            When potpourri3d is not installed.
+        ShapeError
+            When the shape has no surface, or no distances can be measured on it.
+        """
+        surface = largest_piece(_surface(shape))
+        distances, areas = geodesic_matrix(surface, self.samples, shape.name)
+        weights = np.sqrt(areas / areas.sum())
+        weighted = weights[:, None] * distances * weights / np.sqrt(areas.sum())
+        return largest_values(weighted, self.n_values)
+
+    def compare(self, descriptions: Sequence[Any]) -> Array:
+        """Compute the mean of 2|a − b| / (a + b) over the values of each two shapes.
+
+        Parameters
+        ----------
+        descriptions
+            What `describe` gave for each shape.
+
+        Returns
+        -------
+        numpy.ndarray
+            ``(n_shapes, n_shapes)`` distances.
+        """
+        count = min(len(values) for values in descriptions)
+        known = np.stack([values[:count] for values in descriptions])
+        return np.stack([np.mean(2 * np.abs(row - known) / (row + known), axis=1) for row in known])
+
+
+def _surface(shape: Shape) -> Surface:
+    """Return the mesh that a shape was filled from."""
+    if shape.surface is None:
+        msg = f"{shape.name}: has no surface; read a mesh"
+        raise ShapeError(msg)
+    return shape.surface
+
+
+def largest_piece(surface: Surface) -> Surface:
+    """Return the connected piece of the largest area: between pieces there is no distance.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 0, 0], [9, 0, 0], [5, 4, 0], [7, 7, 7]])
+    >>> largest_piece(Surface(corners, np.array([[0, 1, 2], [3, 4, 5]]))).vertices[:, 0]
+    array([5., 9., 5.])
+    """
+    n, faces = len(surface.vertices), surface.faces
+    edges = np.concatenate([faces[:, :2], faces[:, 1:]])
+    graph = coo_array((np.ones(len(edges), bool), (edges[:, 0], edges[:, 1])), shape=(n, n))
+    count, piece = connected_components(graph, directed=False)
+    if count == 1:
+        return surface
+    largest = int(np.argmax(np.bincount(piece, vertex_areas(surface), count)))
+    kept = piece == largest
+    number = np.cumsum(kept) - 1
+    return Surface(surface.vertices[kept], number[faces[kept[faces[:, 0]]]], surface.repairs)
+
+
+def geodesic_matrix(surface: Surface, samples: int, name: str = "surface") -> tuple[Array, Array]:
+    """Measure the geodesic distances between points of a connected surface.
+
+    Parameters
+    ----------
+    surface
+        A triangle surface of one piece.
+    samples
+        Largest number of points; vertices, each the farthest from those before where there are more.
+    name
+        What to call the surface in messages.
+
+    Returns
+    -------
+    tuple
+        ``(n, n)`` distances, and ``(n,)`` area of the part of the surface that is nearest to each point.
+
+    Raises
+    ------
+    MissingExtraError
+        When potpourri3d is not installed.
+    ShapeError
+        When the solver finds no distances.
+    """
+    solver = require("potpourri3d", "potpourri3d").MeshHeatMethodDistanceSolver(
+        np.ascontiguousarray(surface.vertices), np.ascontiguousarray(surface.faces)
+    )
+    n = min(samples, len(surface.vertices))
+    rows = np.empty((n, len(surface.vertices)), np.float32)
+    nearest = np.full(len(surface.vertices), np.inf)
+    chosen, owner = np.arange(n), np.zeros(len(surface.vertices), np.int64)
+    following = 0
+    for i in range(n):
+        # All vertices keep their order: nothing has to be chosen.
+        vertex = i if n == len(surface.vertices) else following
+        rows[i], chosen[i] = solver.compute_distance(vertex), vertex
+        rows[i, vertex] = 0
+        closer = rows[i] < nearest
+        nearest[closer], owner[closer] = rows[i, closer], i
+        following = int(np.argmax(nearest))
+    distances = rows[:, chosen].astype(np.float64)
+    if not np.isfinite(distances).all():
+        msg = f"{name}: distances over the surface are not finite; mend its thin or double triangles"
+        raise ShapeError(msg)
+    return (distances + distances.T) / 2, np.bincount(owner, vertex_areas(surface), n)
+
+
+def vertex_areas(surface: Surface) -> Array:
+    """Return ``(n_vertices,)`` a third of the area of the faces at each vertex."""
+    a, b, c = surface.triangles.transpose(1, 0, 2)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return np.bincount(surface.faces.ravel(), np.repeat(areas / 3, 3), len(surface.vertices))
+
+
+def largest_values(matrix: Array, count: int) -> Array:
+    """Return the largest singular values of a symmetric matrix, largest first."""
+    if len(matrix) <= max(_DENSE, 4 * count):
+        found = np.abs(eigvalsh(matrix))
+    else:
+        found = np.abs(eigsh(matrix, count, v0=np.ones(len(matrix)), return_eigenvectors=False))
+    return np.sort(found)[::-1][:count]
