@@ -7,8 +7,30 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spem.codes.normalise import Normalisation, relative_deviations, unit_rms
+from spem.codes.features import sweep_bands
+from spem.codes.normalise import Normalisation, peak_share, relative_deviations, unit_rms
+from spem.codes.settings import Settings
+from spem.embedding.maps import compute_maps
 from spem.errors import ParameterError
+from spem.shapes.synthetic import disk
+
+
+def test_share_of_the_peak_is_of_the_first_projection_in_any_unit():
+    """Only the first projection counts, its largest magnitude is one, and zeros stay zero."""
+    maps = np.random.default_rng(2).normal(size=(50, 3))
+    shares = peak_share(maps)
+    assert np.abs(shares).max() == 1
+    np.testing.assert_allclose(peak_share(maps * [1e200, 0, 9]), shares, rtol=1e-14)
+    assert not peak_share(np.zeros((4, 2))).any()
+
+
+def test_share_of_the_mean_field_falls_from_the_boundary():
+    """On a disk the share of the first SPEM map is near one at the rim and least at the middle."""
+    shape = disk(radius=12.0, spacing=1.0)
+    shares = peak_share(compute_maps(sweep_bands(shape, Settings()), 3).values)
+    radius = np.linalg.norm(shape.points - shape.points.mean(axis=0), axis=1)
+    assert shares[radius.argmax()] > 0.9
+    assert shares.argmin() == radius.argmin()
 
 
 def test_unit_rms_has_mean_square_one_and_keeps_zero_columns():

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sklearn.base import clone
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from spem.codes.normalise import Normalisation
+from spem.codes.normalise import Normalisation, peak_share
 from spem.codes.vlad import VLAD, encode, vlad
 from spem.errors import ParameterError
 
@@ -53,6 +53,54 @@ def test_moments_and_paper_settings_share_the_first_half():
     one, two = (VLAD(5, moments=m, random_state=0).fit_transform(shapes) for m in (1, 2))
     first = two.reshape(4, 5, 2, 3)[:, :, 0].reshape(4, -1)
     np.testing.assert_allclose(first / np.linalg.norm(first, axis=1, keepdims=True), one, rtol=1e-12)
+
+
+def test_levels_by_hand():
+    """Nodes of two levels are summed apart, and each sum has unit length before the power."""
+    nodes, center = np.array([[1.0, 0.0], [2.0, 0.0], [4.0, 3.0]]), np.zeros((1, 2))
+    code = vlad(nodes, center, 1.0, levels=np.array([0, 0, 1]), n_levels=2)
+    np.testing.assert_allclose(code, np.array([1, 0, 0.8, 0.6]) / np.sqrt(2), rtol=1e-14)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 1000), st.integers(1, 5), st.integers(1, 2))
+def test_a_level_is_the_code_of_its_nodes(seed, n_levels, moments):
+    """Level by level a code is that of the nodes of this level alone, but for the total length."""
+    rng = np.random.default_rng(seed)
+    nodes, centers, spreads = rng.normal(size=(200, 3)), rng.normal(size=(4, 3)), np.ones((4, 3))
+    second, levels = spreads if moments == 2 else None, rng.integers(0, n_levels, 200)
+    parts = vlad(nodes, centers, 0.5, second, levels, n_levels).reshape(n_levels, -1)
+    for level, part in enumerate(parts):
+        alone = vlad(nodes[levels == level], centers, 0.5, second)
+        np.testing.assert_allclose(part / np.linalg.norm(part), alone, atol=1e-12)
+
+
+def test_levels_hold_equally_many_training_nodes():
+    """A third of the training nodes is in each of three levels, and a code has a share for each."""
+    shapes = collection(12)
+    learner = VLAD(5, levels=3, random_state=0).fit(shapes)
+    shares = np.concatenate([peak_share(maps) for (maps,) in shapes])
+    counts = np.bincount(np.searchsorted(learner.cuts_[0], shares))
+    np.testing.assert_allclose(counts / shares.size, 1 / 3, atol=0.01)
+    assert learner.transform(shapes).shape == (12, 3 * 5 * 3 * 2)
+
+
+def test_one_level_is_the_plain_code():
+    """A single level has no cut, and codes are those of all nodes together."""
+    shapes = collection(n_bands=2)
+    learner = VLAD(5, random_state=0).fit(shapes)
+    centers = [words.cluster_centers_ for words in learner.vocabularies_]
+    assert [cuts.size for cuts in learner.cuts_] == [0, 0]
+    plain = [encode(bands, learner.normalisations_, centers, 0.5, learner.spreads_) for bands in shapes]
+    np.testing.assert_array_equal(learner.transform(shapes), plain)
+
+
+def test_levels_do_not_depend_on_the_unit_of_the_maps():
+    """Maps of another unit, or of a shape with more nodes of the same values, give the same levels."""
+    shapes = [(np.float64(maps),) for (maps,) in collection()]
+    learner = VLAD(5, levels=4, random_state=0).fit(shapes)
+    again = [np.tile(1000 * maps, (2, 1)) for (maps,) in shapes]
+    np.testing.assert_allclose(learner.transform(again), learner.transform(shapes), atol=1e-9)
 
 
 def test_vlad_of_nodes_on_their_centres_is_zero():
@@ -154,6 +202,7 @@ def test_bad_maps_are_refused(shapes, message):
         {"moments": 3},
         {"n_centers": 0},
         {"nodes_per_shape": 0},
+        {"levels": 0},
         {"n_init": 0},
     ],
 )

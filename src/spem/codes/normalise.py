@@ -122,6 +122,32 @@ def unit_rms(maps: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.asarray(unit)
 
 
+def peak_share(maps: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return the first projection of each node over its largest magnitude on the shape.
+
+    The first SPEM map is nearly the mean field: its share runs from 1 at the boundary down to the deepest
+    nodes, whatever the unit of the maps.
+
+    Parameters
+    ----------
+    maps
+        ``(n_nodes, n_maps)`` projections of one shape.
+
+    Returns
+    -------
+    NDArray
+        ``(n_nodes,)`` shares, at most 1; zero where the projection is zero everywhere.
+
+    Examples
+    --------
+    >>> peak_share(np.array([[4.0, 0.0], [1.0, 7.0]]))
+    array([1.  , 0.25])
+    """
+    first = np.asarray(maps[:, 0], np.float64)
+    peak = np.abs(first).max()
+    return np.asarray(first / peak if peak > 0 else first)
+
+
 def relative_deviations(samples: Sequence[NDArray[np.floating]]) -> NDArray[np.float64]:
     """Learn the weight of each projection index from the training nodes.
 

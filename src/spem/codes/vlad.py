@@ -13,7 +13,7 @@ from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_is_fitted
 
 from spem.codes.bands import Bands, iterate_bands
-from spem.codes.normalise import Normalisation, Scaling, unit_rms
+from spem.codes.normalise import Normalisation, Scaling, peak_share, unit_rms
 from spem.codes.vocabulary import Vocabulary, sum_residuals
 from spem.errors import ParameterError
 
@@ -23,6 +23,8 @@ def vlad(
     centers: NDArray[np.floating],
     power: float = 0.25,
     spreads: NDArray[np.floating] | None = None,
+    levels: NDArray[np.integer] | None = None,
+    n_levels: int = 1,
 ) -> NDArray[np.float64]:
     """Aggregate the node features of one shape against a vocabulary: (5.1)-(5.3).
 
@@ -37,6 +39,9 @@ def vlad(
     elementwise, where σ² is the mean square of the training nodes of c, is normalised like R and
     put next to it. R tells where the nodes of a shape lie about a word, Q how widely.
 
+    With `levels` the nodes of each level have sums of their own, normalised by themselves, so that the
+    many nodes of one level do not drown what the few of another tell.
+
     Parameters
     ----------
     features
@@ -47,18 +52,23 @@ def vlad(
         Exponent α of (5.3), in [0, 1].
     spreads
         ``(n_centers, n_features)`` mean squares σ² to compare with; None for first moments only.
+    levels
+        ``(n_nodes,)`` level of each node, below `n_levels`; all 0 by default.
+    n_levels
+        Number of levels.
 
     Returns
     -------
     NDArray
-        ``(n_centers * n_features,)`` code, centre by centre; twice that with `spreads`.
+        ``(n_levels * n_centers * n_features,)`` code, level by level and in these centre by centre; twice
+        that with `spreads`.
 
     Examples
     --------
     >>> vlad(np.array([[0.0, 0.0], [0.3, 0.4]]), np.array([[0.0, 0.0], [5.0, 5.0]]), power=1.0)
     array([0.6, 0.8, 0. , 0. ])
     """
-    found = sum_residuals(features, centers)
+    found = sum_residuals(features, centers, levels, n_levels)
     moments = [found.sums] if spreads is None else [found.sums, found.excess(spreads)]
     rows = np.hstack([moment / _length(moment, axis=1) for moment in moments])
     code = np.sign(rows) * np.abs(rows) ** power
@@ -71,6 +81,7 @@ def encode(
     centers: Sequence[NDArray[np.floating]],
     power: float = 0.25,
     spreads: Sequence[NDArray[np.floating]] | None = None,
+    cuts: Sequence[NDArray[np.floating]] | None = None,
 ) -> NDArray[np.float64]:
     """Make the code of one shape from its maps, one band of ρ after the other.
 
@@ -89,11 +100,14 @@ def encode(
         Exponent α of (5.3).
     spreads
         For each band ``(n_centers, n_maps)`` mean squares; None for first moments only.
+    cuts
+        For each band ``(n_levels - 1,)`` values of `peak_share` that divide the nodes into levels; None for
+        one level.
 
     Returns
     -------
     NDArray
-        ``(n_code,)`` code: n_centers · n_maps entries for each band and moment.
+        ``(n_code,)`` code: n_levels · n_centers · n_maps entries for each band and moment.
 
     Examples
     --------
@@ -102,10 +116,14 @@ def encode(
     array([ 0.707, -0.707])
     """
     squares = [None] * len(bands) if spreads is None else spreads
-    together = zip(bands, normalisations, centers, squares, strict=True)
-    code = np.concatenate(
-        [vlad(normal.apply(maps), words, power, spread) for maps, normal, words, spread in together]
-    )
+    between = [np.empty(0)] * len(bands) if cuts is None else cuts
+    codes = []
+    for maps, normal, words, spread, inner in zip(
+        bands, normalisations, centers, squares, between, strict=True
+    ):
+        levels = np.searchsorted(inner, peak_share(maps)) if len(inner) else None
+        codes.append(vlad(normal.apply(maps), words, power, spread, levels, len(inner) + 1))
+    code = np.concatenate(codes)
     return np.asarray(code / _length(code))
 
 
@@ -130,6 +148,8 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         ``"standard"``, ``"whiten"``, ``"deviation"`` or ``"none"``: see `Normalisation`.
     moments
         1 for the residual sums of (5.2), 2 for their squares beside them: see `vlad`.
+    levels
+        Number of levels of `peak_share` that nodes are summed in, with equally many training nodes each.
     n_init
         Number of k-means++ starts for each vocabulary.
     random_state
@@ -143,6 +163,8 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         For each band the fitted `Vocabulary`.
     spreads_
         For each band ``(n_centers, n_maps)`` mean squared difference of training nodes from their centre.
+    cuts_
+        For each band ``(levels - 1,)`` values of `peak_share` between levels.
     n_maps_
         For each band the number of maps.
 
@@ -162,6 +184,7 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         nodes_per_shape: int = 500,
         scaling: Scaling = "standard",
         moments: int = 2,
+        levels: int = 1,
         n_init: int = 1,
         random_state: int | RandomState | None = None,
     ) -> None:
@@ -170,6 +193,7 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         self.nodes_per_shape = nodes_per_shape
         self.scaling = scaling
         self.moments = moments
+        self.levels = levels
         self.n_init = n_init
         self.random_state = random_state
 
@@ -177,9 +201,9 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         """Learn normalisations and vocabularies from the maps of the shapes `X`; `y` is ignored."""
         self._check_parameters()
         random = check_random_state(self.random_state)
-        raw, unit = _draw(iterate_bands(X), self.nodes_per_shape, random)
+        raw, unit, shares = _draw(iterate_bands(X), self.nodes_per_shape, random)
         self.n_maps_ = tuple(samples[0].shape[1] for samples in raw)
-        self.normalisations_, self.vocabularies_, self.spreads_ = [], [], []
+        self.normalisations_, self.vocabularies_, self.spreads_, self.cuts_ = [], [], [], []
         for band in range(len(raw)):
             normal = self._normalisation(raw[band], unit[band])
             # At unit rms over its own shape, a sample has only the affine part before it.
@@ -189,6 +213,7 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
             self.normalisations_.append(normal)
             self.vocabularies_.append(words)
             self.spreads_.append(sum_residuals(nodes, words.cluster_centers_).spreads)
+            self.cuts_.append(_quantiles(np.concatenate(shares[band]), self.levels))
         return self
 
     def transform(self, X: Iterable[Any]) -> NDArray[np.float64]:
@@ -197,14 +222,15 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         centers = [words.cluster_centers_ for words in self.vocabularies_]
         spreads = self.spreads_ if self.moments == 2 else None
         shapes = iterate_bands(X, self.n_maps_)
-        return np.stack(
-            [encode(bands, self.normalisations_, centers, self.power, spreads) for bands in shapes]
-        )
+        learnt = self.normalisations_, centers, self.power, spreads, self.cuts_
+        return np.stack([encode(bands, *learnt) for bands in shapes])
 
     @property
     def _n_features_out(self) -> int:
         """Length of a code, as the naming of the columns asks for it."""
-        return int(self.moments * sum(words.cluster_centers_.size for words in self.vocabularies_))
+        return int(
+            self.levels * self.moments * sum(words.cluster_centers_.size for words in self.vocabularies_)
+        )
 
     def __sklearn_tags__(self) -> Any:
         """Declare that the entries of the input may have any length, in two or three dimensions."""
@@ -235,7 +261,7 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         if not 0 <= self.power <= 1:
             msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"
             raise ParameterError(msg)
-        for name in ("n_centers", "nodes_per_shape", "n_init"):
+        for name in ("n_centers", "nodes_per_shape", "levels", "n_init"):
             if getattr(self, name) < 1:
                 msg = f"{name}={getattr(self, name)} must be at least 1"
                 raise ParameterError(msg)
@@ -250,14 +276,19 @@ def _length(values: NDArray[np.float64], axis: int | None = None) -> NDArray[np.
 def _draw(
     shapes: Iterable[Bands], n_nodes: int, random: RandomState
 ) -> tuple[list[list[NDArray[np.floating]]], ...]:
-    """Sample nodes of every shape, the same in all bands: for each band as given, and at unit rms."""
-    raw: list[list[NDArray[np.floating]]] = []
-    unit: list[list[NDArray[np.floating]]] = []
+    """Sample nodes of all shapes, the same in all bands: as given, at unit rms, and shares of the peak."""
+    drawn: tuple[list[list[NDArray[np.floating]]], ...] = ([], [], [])
     for bands in shapes:
-        raw, unit = raw or [[] for _ in bands], unit or [[] for _ in bands]
+        if not drawn[0]:
+            drawn = tuple([[] for _ in bands] for _ in drawn)
         total = len(bands[0])
         rows = np.arange(total) if total <= n_nodes else np.sort(random.permutation(total)[:n_nodes])
         for band, maps in enumerate(bands):
-            raw[band].append(maps[rows])
-            unit[band].append(unit_rms(maps)[rows])
-    return raw, unit
+            for kept, values in zip(drawn, (maps, unit_rms(maps), peak_share(maps)), strict=True):
+                kept[band].append(values[rows])
+    return drawn
+
+
+def _quantiles(shares: NDArray[np.floating], levels: int) -> NDArray[np.float64]:
+    """Return the values that divide training nodes into levels of equal size."""
+    return np.asarray(np.quantile(shares.astype(np.float64), np.arange(1, levels) / levels))

@@ -39,18 +39,20 @@ def _accumulate(
     features: NDArray[Any],
     centers: NDArray[Any],
     labels: NDArray[np.int32],
+    levels: NDArray[np.int64],
     counts: NDArray[np.int64],
     sums: NDArray[np.float64],
     squares: NDArray[np.float64],
 ) -> None:
-    """Add each row's difference from its centre, and its square, to what that centre has."""
+    """Add each row's difference from its centre, and its square, to what that centre has at its level."""
     for i in range(features.shape[0]):
         c = labels[i]
-        counts[c] += 1
+        row = levels[i] * centers.shape[0] + c
+        counts[row] += 1
         for j in range(features.shape[1]):
             difference = np.float64(features[i, j]) - centers[c, j]
-            sums[c, j] += difference
-            squares[c, j] += difference * difference
+            sums[row, j] += difference
+            squares[row, j] += difference * difference
 
 
 def nearest_centers(features: NDArray[np.floating], centers: NDArray[np.floating]) -> NDArray[np.int32]:
@@ -83,14 +85,16 @@ def nearest_centers(features: NDArray[np.floating], centers: NDArray[np.floating
 class Residuals:
     """What the nodes of one shape differ from their centres by, summed centre by centre.
 
+    Nodes of several levels are summed apart: n_rows is n_levels · n_centers, level after level.
+
     Parameters
     ----------
     counts
-        ``(n_centers,)`` number of nodes assigned to each centre.
+        ``(n_rows,)`` number of nodes assigned to each centre.
     sums
-        ``(n_centers, n_features)`` sums R of the differences (5.2).
+        ``(n_rows, n_features)`` sums R of the differences (5.2).
     squares
-        ``(n_centers, n_features)`` sums of the squared differences.
+        ``(n_rows, n_features)`` sums of the squared differences.
     """
 
     counts: NDArray[np.int64]
@@ -98,16 +102,22 @@ class Residuals:
     squares: NDArray[np.float64]
 
     def excess(self, spreads: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Return how far the squares exceed those of as many nodes of mean square `spreads`."""
-        return np.asarray(self.squares - self.counts[:, None] * spreads)
+        """Return how far the squares exceed those of as many nodes of mean square `spreads`, one a centre."""
+        repeated = np.tile(spreads, (len(self.counts) // len(spreads), 1))
+        return np.asarray(self.squares - self.counts[:, None] * repeated)
 
     @property
     def spreads(self) -> NDArray[np.float64]:
-        """``(n_centers, n_features)`` mean squared difference; zero for a centre without a node."""
+        """``(n_rows, n_features)`` mean squared difference; zero for a centre without a node."""
         return np.asarray(self.squares / np.maximum(self.counts, 1)[:, None])
 
 
-def sum_residuals(features: NDArray[np.floating], centers: NDArray[np.floating]) -> Residuals:
+def sum_residuals(
+    features: NDArray[np.floating],
+    centers: NDArray[np.floating],
+    levels: NDArray[np.integer] | None = None,
+    n_levels: int = 1,
+) -> Residuals:
     """Sum, for each centre, the differences of the nodes assigned to it from it (5.2), and their squares.
 
     Parameters
@@ -116,6 +126,10 @@ def sum_residuals(features: NDArray[np.floating], centers: NDArray[np.floating])
         ``(n_nodes, n_features)`` node features of one shape.
     centers
         ``(n_centers, n_features)``.
+    levels
+        ``(n_nodes,)`` level of each node, below `n_levels`; those of each are summed apart. All 0 by default.
+    n_levels
+        Number of levels.
 
     Returns
     -------
@@ -127,10 +141,14 @@ def sum_residuals(features: NDArray[np.floating], centers: NDArray[np.floating])
     >>> found = sum_residuals(np.array([[0.0], [0.5], [2.0]]), np.array([[0.0], [1.5], [9.0]]))
     >>> found.sums.ravel(), found.squares.ravel()
     (array([0.5, 0.5, 0. ]), array([0.25, 0.25, 0.  ]))
+    >>> sum_residuals(np.array([[0.0], [0.5]]), np.zeros((1, 1)), np.array([0, 1]), 2).sums.ravel()
+    array([0. , 0.5])
     """
     rows = np.ascontiguousarray(features)
-    counts, sums, squares = np.zeros(len(centers), np.int64), np.zeros(centers.shape), np.zeros(centers.shape)
-    _accumulate(rows, centers, nearest_centers(rows, centers), counts, sums, squares)
+    each = np.zeros(len(rows), np.int64) if levels is None else np.asarray(levels, np.int64)
+    n_rows = n_levels * len(centers)
+    counts, (sums, squares) = np.zeros(n_rows, np.int64), np.zeros((2, n_rows, centers.shape[1]))
+    _accumulate(rows, centers, nearest_centers(rows, centers), each, counts, sums, squares)
     return Residuals(counts, sums, squares)
 
 
