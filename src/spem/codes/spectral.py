@@ -17,7 +17,7 @@ from spem.embedding.signatures import (
     shared_values,
     wave_kernel_signature,
 )
-from spem.fields.spectrum import Spectrum, solve_spectrum
+from spem.fields.spectrum import Eigenpairs, Spectrum, solve_spectrum
 from spem.shapes.shape import Shape
 
 Array = NDArray[np.float64]
@@ -72,32 +72,59 @@ def spectral_features(spectrum: Spectrum, settings: Settings) -> Bands:
     5
     """
     keep = kept_nodes(spectrum.shape, drop_boundary=settings.drop_boundary)
-    values = _SIGNATURES[settings.features](spectrum, settings)
+    values = signature(spectrum, settings.features, settings)
     return (np.ascontiguousarray(values[keep], np.float32),)
 
 
-def _heat(spectrum: Spectrum, settings: Settings) -> Array:
+def signature(spectrum: Eigenpairs, kind: str, settings: Settings) -> Array:
+    """Compute a signature of a solid or of a surface, at times or energies that all of them have in common.
+
+    Parameters
+    ----------
+    spectrum
+        Eigenpairs.
+    kind
+        ``"hks"``, ``"si-hks"`` or ``"wks"``.
+    settings
+        Number of pairs that all have, and of features.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(n_nodes, n_maps)``.
+
+    Examples
+    --------
+    >>> from spem.fields.surface_spectrum import solve_surface_spectrum
+    >>> from spem.shapes.boundary_surface import boundary_surface
+    >>> from spem.shapes.synthetic import ball
+    >>> sphere = solve_surface_spectrum(boundary_surface(ball(radius=6.0, spacing=1.0)), 40)
+    >>> signature(sphere, "wks", Settings(features="surface-wks", n_pairs=40, n_maps=5)).shape[1]
+    5
+    """
+    return _SIGNATURES[kind](spectrum, settings)
+
+
+def _heat(spectrum: Eigenpairs, settings: Settings) -> Array:
     """Return the HKS at times in units of the squared size."""
-    shape = spectrum.shape
     return heat_kernel_signature(
-        spectrum, shared_times(shape.size, shape.ndim, settings.n_pairs, settings.n_maps)
+        spectrum, shared_times(spectrum.size, spectrum.ndim, settings.n_pairs, settings.n_maps)
     )
 
 
-def _scale_invariant(spectrum: Spectrum, settings: Settings) -> Array:
+def _scale_invariant(spectrum: Eigenpairs, settings: Settings) -> Array:
     """Return the lowest frequencies of the scale-invariant HKS."""
-    low, high = shared_values(spectrum.shape.size, spectrum.shape.ndim, settings.n_pairs, 2)
+    low, high = shared_values(spectrum.size, spectrum.ndim, settings.n_pairs, 2)
     return scale_invariant_signature(spectrum, settings.n_maps, span=(low, high))
 
 
-def _wave(spectrum: Spectrum, settings: Settings) -> Array:
+def _wave(spectrum: Eigenpairs, settings: Settings) -> Array:
     """Return the WKS at energies in units of the inverse squared size, as wide as they lie apart."""
-    shape = spectrum.shape
-    energies = shared_values(shape.size, shape.ndim, settings.n_pairs, settings.n_maps + 2)
+    energies = shared_values(spectrum.size, spectrum.ndim, settings.n_pairs, settings.n_maps + 2)
     return wave_kernel_signature(spectrum, energies[1:-1], deviation=float(np.log(energies[1] / energies[0])))
 
 
-_SIGNATURES: dict[str, Callable[[Spectrum, Settings], Array]] = {
+_SIGNATURES: dict[str, Callable[[Eigenpairs, Settings], Array]] = {
     "hks": _heat,
     "si-hks": _scale_invariant,
     "wks": _wave,

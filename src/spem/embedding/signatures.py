@@ -1,4 +1,4 @@
-"""Signatures of the heat and of the wave equation on the nodes of a shape (3.3), from its eigenpairs."""
+"""Signatures of the heat and of the wave equation on the nodes of a shape or of its surface (3.3)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spem.embedding.heat import positive
 from spem.errors import ParameterError, require_kind
-from spem.fields.spectrum import Spectrum
+from spem.fields.spectrum import Eigenpairs, Spectrum
 
 Array = NDArray[np.float64]
 # exp(-λ t) is 1e-4 at t = 4 ln 10 / λ: heat of that value is spent.
@@ -24,13 +24,15 @@ _EARLY = 0.01
 _DEVIATIONS = 18.0
 
 
-def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike | None = None, *, n_times: int = 100) -> Array:
+def heat_kernel_signature(
+    spectrum: Eigenpairs, times: ArrayLike | None = None, *, n_times: int = 100
+) -> Array:
     """Return how much heat stays at each node, for each of several times: p_t(x, x).
 
     Parameters
     ----------
     spectrum
-        Eigenpairs of the shape; with a free boundary those of the volumetric signature.
+        Eigenpairs of a shape, with a free boundary those of the volumetric signature; or of a surface.
     times
         ``(n_times,)`` t, in length²; by default spread logarithmically from 4 ln 10 / λ of the last pair to
         that of the first one above zero. Take `shared_values` for times that shapes have in common.
@@ -62,7 +64,7 @@ def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike | None = None, *,
 
 
 def scale_invariant_signature(
-    spectrum: Spectrum, n_frequencies: int = 6, *, span: tuple[float, float] | None = None
+    spectrum: Eigenpairs, n_frequencies: int = 6, *, span: tuple[float, float] | None = None
 ) -> Array:
     """Return the heat kernel signature without the effect of scale: |F(∂ log h / ∂ log t)|.
 
@@ -73,7 +75,7 @@ def scale_invariant_signature(
     Parameters
     ----------
     spectrum
-        Eigenpairs of the shape.
+        Eigenpairs of a shape, or of a surface.
     n_frequencies
         How many of the lowest frequencies are kept.
     span
@@ -116,7 +118,7 @@ def scale_invariant_signature(
 
 
 def wave_kernel_signature(
-    spectrum: Spectrum,
+    spectrum: Eigenpairs,
     energies: ArrayLike | None = None,
     *,
     n_energies: int = 100,
@@ -129,7 +131,7 @@ def wave_kernel_signature(
     Parameters
     ----------
     spectrum
-        Eigenpairs of the shape.
+        Eigenpairs of a shape, or of a surface.
     energies
         ``(n_energies,)`` e, in 1/length² as the eigenvalues are; by default spread logarithmically over those
         above zero, 2σ from the ends. Take `shared_values` for energies that shapes have in common.
@@ -177,9 +179,9 @@ def shared_values(size: float, ndim: int, n_pairs: int, count: int) -> Array:
     Parameters
     ----------
     size
-        L, `Shape.size`.
+        L, `Shape.size`, or the root of the area of a surface.
     ndim
-        Dimension d of the shapes.
+        Dimension d of the shapes; two of surfaces.
     n_pairs
         Number n of pairs that their spectra have.
     count
@@ -235,19 +237,18 @@ def shared_times(size: float, ndim: int, n_pairs: int, count: int) -> Array:
     return math.log(10) / shared_values(size, ndim, n_pairs, count)[::-1]
 
 
-def _above_zero(spectrum: Spectrum) -> NDArray[np.bool_]:
+def _above_zero(spectrum: Eigenpairs) -> NDArray[np.bool_]:
     """Select the values that are not those of a constant."""
     return np.asarray(spectrum.values > 1e-9 * spectrum.values[-1])
 
 
-def _span(spectrum: Spectrum) -> tuple[float, float]:
+def _span(spectrum: Any) -> tuple[float, float]:
     """Return the first value above zero and the last."""
-    require_kind(spectrum, Spectrum, "make it: spem.solve_spectrum(shape)")
+    if not isinstance(spectrum, Eigenpairs):
+        require_kind(spectrum, Spectrum, "make it: spem.solve_spectrum(shape)")
     values = spectrum.values[_above_zero(spectrum)]
     if values.size < 2 or not values[-1] > values[0]:
-        msg = (
-            f"{spectrum.shape.name}: no two values above zero among {spectrum.n_pairs}; solve for more pairs"
-        )
+        msg = f"{spectrum.name}: no two values above zero among {spectrum.n_pairs}; solve for more pairs"
         raise ParameterError(msg)
     return float(values[0]), float(values[-1])
 

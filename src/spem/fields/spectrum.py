@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,41 @@ Array = NDArray[np.float64]
 Condition = Literal["free", "absorbing"]
 # A third moment below this share of the largest there can be does not carry the sign.
 _SMALL_MOMENT = 1e-3
+
+
+@runtime_checkable
+class Eigenpairs(Protocol):
+    """The lowest eigenpairs of the Laplacian of a solid, `Spectrum`, or of a surface, `SurfaceSpectrum`."""
+
+    @property
+    def values(self) -> Array:
+        """``(n_pairs,)`` eigenvalues, ascending, in 1/length²."""
+        ...
+
+    @property
+    def vectors(self) -> Array:
+        """``(n_nodes, n_pairs)`` eigenvectors, of unit L2 norm over what they are of."""
+        ...
+
+    @property
+    def n_pairs(self) -> int:
+        """Number of eigenpairs."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """Short name for messages."""
+        ...
+
+    @property
+    def ndim(self) -> int:
+        """Dimension of what they are of: that of the shape, two of a surface."""
+        ...
+
+    @property
+    def size(self) -> float:
+        """Its volume, or area, to the power 1 / `ndim`: a length."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +80,21 @@ class Spectrum:
     def n_pairs(self) -> int:
         """Number of eigenpairs."""
         return self.values.size
+
+    @property
+    def name(self) -> str:
+        """Name of the shape."""
+        return self.shape.name
+
+    @property
+    def ndim(self) -> int:
+        """Dimension of the shape."""
+        return self.shape.ndim
+
+    @property
+    def size(self) -> float:
+        """Size of the shape, `Shape.size`."""
+        return self.shape.size
 
     def truncated(self, n_pairs: int) -> Spectrum:
         """Return the lowest of the pairs.
@@ -135,7 +185,7 @@ def solve_spectrum(
     for c, (_, own) in enumerate(solved):
         column = np.flatnonzero((first[c] <= chosen) & (chosen < first[c + 1]))
         vectors[np.ix_(component == c, column)] = own[:, chosen[column] - first[c]]
-    vectors *= _signs(vectors) / np.sqrt(np.prod(shape.spacing))
+    vectors *= eigenvector_signs(vectors) / np.sqrt(np.prod(shape.spacing))
     return Spectrum(shape, values[chosen], vectors, boundary)
 
 
@@ -163,6 +213,32 @@ def free_system(system: System) -> System:
     nothing = np.zeros(system.n_nodes)
     diagonal = inside.astype(np.float64) @ np.repeat(system.weights, 2)
     return replace(system, rhs=nothing, diagonal=diagonal, mass=np.ones(system.n_nodes))
+
+
+def eigenvector_signs(vectors: Array, weights: Array | None = None) -> Array:
+    """Return the sign that makes the third moment of each vector positive.
+
+    Where that is negligible, it is the sign that makes the entry of largest magnitude positive.
+
+    Parameters
+    ----------
+    vectors
+        ``(n_nodes, n_pairs)`` vectors, none of them zero everywhere.
+    weights
+        ``(n_nodes,)`` volume or area of each node; equal by default.
+
+    Examples
+    --------
+    >>> eigenvector_signs(np.array([[1.0, -3.0], [1.0, 1.0], [-2.0, 2.0]]))
+    array([-1., -1.])
+    """
+    largest = np.take_along_axis(vectors, np.abs(vectors).argmax(axis=0)[None], axis=0)[0]
+    square = np.square(vectors)
+    if weights is not None:
+        square *= weights[:, None]
+    third, bound = np.sum(square * vectors, axis=0), np.sum(square * np.abs(vectors), axis=0)
+    leading = np.where(np.abs(third) > _SMALL_MOMENT * bound, third, largest)
+    return np.where(leading < 0, -1.0, 1.0)
 
 
 def _is_whole(number: Any) -> bool:
@@ -195,12 +271,3 @@ def _restricted(system: System, nodes: NDArray[Any]) -> System:
     shape = Shape(mask, system.shape.spacing, system.shape.origin, system.shape.name)
     rows = {name: getattr(system, name)[nodes] for name in ("rhs", "diagonal", "mass")}
     return System(shape, domain, system.weights, boundary=system.boundary, **rows)
-
-
-def _signs(vectors: Array) -> Array:
-    """Sign that makes the third moment positive, or the largest entry where that is negligible."""
-    largest = np.take_along_axis(vectors, np.abs(vectors).argmax(axis=0)[None], axis=0)[0]
-    square = np.square(vectors)
-    third, bound = np.sum(square * vectors, axis=0), np.sum(square * np.abs(vectors), axis=0)
-    leading = np.where(np.abs(third) > _SMALL_MOMENT * bound, third, largest)
-    return np.where(leading < 0, -1.0, 1.0)
