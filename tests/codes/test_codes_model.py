@@ -13,6 +13,7 @@ from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.codes.vlad import VLAD
 from spem.errors import ModelError, ParameterError, ReadError
+from spem.retrieval.distances import correlation_distance
 
 SETTINGS = Settings(features="spem", n_maps=3, n_centers=4, rho_ranges=((0.02, 0.2), (0.1, 0.5)))
 
@@ -123,3 +124,50 @@ def test_truncated_model_is_refused(model, tmp_path):
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(ReadError, match="truncated"):
         Model.load(path)
+
+
+JOINED = Settings(features="spem+wks", n_maps=3, n_centers=4)
+
+
+def test_joined_model_adds_the_distances_of_its_parts():
+    """Correlation distances of joined codes are those of each kind's own codes, by the model's weights."""
+    model = Model.fit(JOINED, shapes(), ndim=2)
+    alone = [Model.fit(part, [(bands[i],) for bands in shapes()]) for i, part in enumerate(JOINED.parts(2))]
+    joined = np.stack([model.encode(bands) for bands in shapes(1)])
+    parts = [np.stack([each.encode(bands[i]) for bands in shapes(1)]) for i, each in enumerate(alone)]
+    expected = sum(w * correlation_distance(p, p) for w, p in zip(model.weights, parts, strict=True))
+    np.testing.assert_allclose(correlation_distance(joined, joined), expected, atol=1e-6)
+    assert model.n_code == joined.shape[1] == 48
+    assert sum(model.weights) == pytest.approx(1)
+
+
+def test_joined_model_survives_its_file(tmp_path):
+    """Digest, weights and codes are the same; without the weights it is refused."""
+    model = Model.fit(JOINED, shapes(), ndim=2)
+    model.save(tmp_path / "m.spem")
+    loaded = Model.load(tmp_path / "m.spem")
+    assert (loaded.digest, loaded.weights, loaded.ndim) == (model.digest, model.weights, 2)
+    np.testing.assert_array_equal(loaded.encode(shapes(1)[0]), model.encode(shapes(1)[0]))
+    arrays = model.to_arrays()
+    del arrays["weights"]
+    write_container(tmp_path / "m.spem", "model", model.to_header(), arrays)
+    with pytest.raises(ModelError, match="lacks the array 'weights'"):
+        Model.load(tmp_path / "m.spem")
+
+
+def test_joined_model_knows_what_it_is_made_of():
+    """A generator will do to learn it, its kinds are named, and features of one kind alone are refused."""
+    model = Model.fit(JOINED, iter(shapes()), ndim=2)
+    assert model.digest == Model.fit(JOINED, shapes(), ndim=2).digest
+    assert repr(model).startswith(f"Model({model.digest}, spem 0.")
+    assert [part.settings.features for part in model.parts] == ["spem", "wks"]
+    with pytest.raises(ParameterError, match=f"cat has 1 bands, model {model.digest} expects 2"):
+        model.encode(np.ones((5, 3)), "cat")
+    with pytest.raises(ParameterError, match=rf"cat has \[2\] maps in its bands, model {model.digest}"):
+        model.encode((np.ones((5, 3)), np.ones((9, 2))), "cat")
+
+
+def test_settings_that_leave_the_kind_open_are_resolved():
+    """A model names the kinds that "auto" stood for, so that it is the same tomorrow."""
+    model = Model.fit(Settings(n_maps=3, n_centers=4), [bands[:1] for bands in shapes()], ndim=4)
+    assert model.settings == Settings(features="spem", n_maps=3, n_centers=4)

@@ -6,9 +6,11 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from spem.codes.bands import Bands
+from spem.codes.contour_features import contour_features
 from spem.codes.features import node_features, sweep_bands
 from spem.codes.settings import Settings
 from spem.codes.spectral import shape_spectrum, spectral_features
+from spem.codes.surface_features import surface_features
 from spem.errors import ParameterError
 from spem.shapes.shape import Shape
 
@@ -68,5 +70,10 @@ def _signatures(shape: Shape, settings: Settings, _: int | None) -> Bands:
 
 # Another kind takes a row in `spem.codes.traits.TRAITS`, and one here.
 KINDS: Mapping[str, Maker] = MappingProxyType(
-    {"spem": _maps, "hks": _signatures, "si-hks": _signatures, "wks": _signatures}
+    {
+        "spem": _maps,
+        **dict.fromkeys(("hks", "si-hks", "wks"), _signatures),
+        **dict.fromkeys(("surface-hks", "surface-si-hks", "surface-wks"), surface_features),
+        **dict.fromkeys(("shape-context", "inner-distance"), contour_features),
+    }
 )

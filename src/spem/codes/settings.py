@@ -159,7 +159,8 @@ class Settings:
             return
         for entry in fields(self):
             kinds = [kind for kind, traits in TRAITS.items() if entry.name in traits.own]
-            if kinds and not set(kinds) & set(words) and getattr(self, entry.name) != entry.default:
+            usual = (entry.default, *(TRAITS[word].defaults.get(entry.name) for word in words))
+            if kinds and not set(kinds) & set(words) and getattr(self, entry.name) not in usual:
                 of = " or ".join(map(repr, kinds))
                 msg = f"{entry.name}: a setting of features {of}, not of {self.features!r}; leave it out"
                 raise ParameterError(msg)

@@ -37,8 +37,9 @@ class Traits:
     defaults: Mapping[str, Any] = field(default_factory=lambda: _USUAL)
 
 
-_OF_SWEEPS = ("rho_ranges", "scheme", "n_rho", "centred")
-_OF_SPECTRA = ("n_pairs",)
+_OF_SWEEPS = ("rho_ranges", "scheme", "n_rho", "centred", "n_maps")
+_OF_SPECTRA = ("n_pairs", "n_maps")
+_CONTOUR = MappingProxyType(_USUAL | {"n_maps": 60, "n_centers": 256})
 TRAITS: Mapping[str, Traits] = MappingProxyType(
     {
         "spem": Traits("SPEM maps", own=_OF_SWEEPS),
@@ -48,11 +49,15 @@ TRAITS: Mapping[str, Traits] = MappingProxyType(
         "surface-hks": Traits("heat kernel signature of the surface", (3,), _OF_SPECTRA),
         "surface-si-hks": Traits("the same, invariant to scale", (3,), _OF_SPECTRA),
         "surface-wks": Traits("wave kernel signature of the surface", (3,), _OF_SPECTRA),
+        "shape-context": Traits("what each point of the contour sees", (2,), defaults=_CONTOUR),
+        "inner-distance": Traits("the same, along ways inside", (2,), defaults=_CONTOUR),
     }
 )
 # What to take of shapes of a dimension where the kind is not named; of others there are maps alone.
-_SURFACE: Mapping[int, tuple[str, ...]] = MappingProxyType({3: ("surface-wks",)})
-_BEST: Mapping[int, tuple[str, ...]] = MappingProxyType({})
+_SURFACE: Mapping[int, tuple[str, ...]] = MappingProxyType({2: ("shape-context",), 3: ("surface-wks",)})
+_BEST: Mapping[int, tuple[str, ...]] = MappingProxyType(
+    {ndim: ("spem", *kinds) for ndim, kinds in _SURFACE.items()}
+)
 AUTO, SURFACE = "auto", "surface"
 DEFAULTED = tuple(_USUAL)
 
