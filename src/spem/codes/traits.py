@@ -39,7 +39,7 @@ class Traits:
 
 _OF_SWEEPS = ("rho_ranges", "scheme", "n_rho", "centred", "n_maps")
 _OF_SPECTRA = ("n_pairs", "n_maps")
-_CONTOUR = MappingProxyType(_USUAL | {"n_maps": 60, "n_centers": 256})
+_CONTOUR: Mapping[str, Any] = MappingProxyType({**_USUAL, "n_maps": 40, "n_centers": 256})
 TRAITS: Mapping[str, Traits] = MappingProxyType(
     {
         "spem": Traits("SPEM maps", own=_OF_SWEEPS),
