@@ -73,19 +73,19 @@ def test_a_quarter_turn_keeps_histograms_about_the_tangent(context, hand):
     """Turned by 90 degrees a shape has the same mean histogram about tangents; about an axis they shift."""
     turned = Shape.from_mask(np.rot90(hand.mask), hand.spacing)
     plain = Shape.from_mask(hand.mask, hand.spacing)
-    np.testing.assert_allclose(context(turned, 128).mean(axis=0), context(plain, 128).mean(axis=0), atol=2e-3)
-    fixed, shifted = (context(s, 128, frame="fixed").mean(axis=0).reshape(5, 12) for s in (plain, turned))
-    np.testing.assert_allclose(np.roll(fixed, 3, axis=1), shifted, atol=2e-3)
+    np.testing.assert_allclose(context(turned).mean(axis=0), context(plain).mean(axis=0), atol=2e-3)
+    fixed, shifted = (context(s, frame="fixed").mean(axis=0).reshape(8, 8) for s in (plain, turned))
+    np.testing.assert_allclose(np.roll(fixed, 2, axis=1), shifted, atol=2e-3)
     assert np.abs(fixed - shifted).max() > 5e-3
 
 
 @BOTH
 def test_a_mirrored_shape_has_directions_in_reverse_order(context, hand):
-    """With twelve bins direction 0 along the tangent becomes direction 6, and so on round the normal."""
+    """With eight bins direction 0 along the tangent becomes direction 4, and so on round the normal."""
     plain = Shape.from_mask(hand.mask, hand.spacing)
     mirrored = Shape.from_mask(hand.mask[::-1], hand.spacing)
-    seen, reverse = (context(s, 128).mean(axis=0).reshape(5, 12) for s in (plain, mirrored))
-    np.testing.assert_allclose(seen[:, (6 - np.arange(12)) % 12], reverse, atol=2e-3)
+    seen, reverse = (context(s).mean(axis=0).reshape(8, 8) for s in (plain, mirrored))
+    np.testing.assert_allclose(seen[:, (4 - np.arange(8)) % 8], reverse, atol=2e-3)
 
 
 def test_bent_arms_change_inner_distances_less():

@@ -11,7 +11,7 @@ from spem.errors import ParameterError
 from spem.shapes.shape import Shape
 
 N_POINTS = 128
-N_ANGLES = 12
+N_ANGLES = 8
 _CONTEXTS = {"shape-context": shape_context, "inner-distance": inner_distance_shape_context}
 
 
@@ -25,7 +25,7 @@ def contour_features(shape: Shape, settings: Settings, threads: int | None = Non
     shape
         A shape of two dimensions.
     settings
-        Kind of features, boundary model, and number of values: twelve directions for each bin of distance.
+        Kind of features, boundary model, and number of values: eight directions for each bin of distance.
     threads
         Without effect: one shape takes milliseconds.
 
@@ -39,14 +39,14 @@ def contour_features(shape: Shape, settings: Settings, threads: int | None = Non
     ShapeError
         When the shape is not of two dimensions.
     ParameterError
-        When the number of values is no multiple of twelve.
+        When the number of values is no multiple of eight.
 
     Examples
     --------
     >>> from spem.shapes.synthetic import disk
-    >>> settings = Settings(features="shape-context", n_maps=60)
+    >>> settings = Settings(features="shape-context", n_maps=64)
     >>> contour_features(disk(radius=10.0, spacing=1.0), settings)[0].shape
-    (128, 60)
+    (128, 64)
     """
     if settings.n_maps % N_ANGLES:
         msg = (

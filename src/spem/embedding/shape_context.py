@@ -30,8 +30,8 @@ def shape_context(
     shape: Shape,
     n_points: int = 128,
     *,
-    n_radii: int = 5,
-    n_angles: int = 12,
+    n_radii: int = 8,
+    n_angles: int = 8,
     frame: Frame = "tangent",
     smoothing: float = 1.0,
     holes: bool = True,
@@ -51,9 +51,9 @@ def shape_context(
     n_points
         Number of points, spread by `spem.embedding.contours.contour_points`.
     n_radii
-        Number of bins of distance.
+        Number of bins of distance; 5 in both publications.
     n_angles
-        Number of bins of direction.
+        Number of bins of direction; 12 in both publications.
     frame
         Where directions are measured from: the tangent, with the shape on the left, or axis 0.
     smoothing, holes, boundary
@@ -77,7 +77,7 @@ def shape_context(
     >>> from spem.shapes.synthetic import disk
     >>> seen = shape_context(disk(1.0, 0.02), 100)
     >>> seen.shape, bool(np.ptp(seen, axis=0).max() < 0.02)
-    ((100, 60), True)
+    ((100, 64), True)
     """
     points = contour_points(shape, n_points, smoothing=smoothing, holes=holes, boundary=boundary)
     target = np.broadcast_to(np.arange(n_points, dtype=np.int32), (n_points, n_points))
@@ -88,8 +88,8 @@ def inner_distance_shape_context(
     shape: Shape,
     n_points: int = 128,
     *,
-    n_radii: int = 5,
-    n_angles: int = 12,
+    n_radii: int = 8,
+    n_angles: int = 8,
     frame: Frame = "tangent",
     smoothing: float = 1.0,
     holes: bool = True,
@@ -107,9 +107,9 @@ def inner_distance_shape_context(
     n_points
         Number of points, spread by `spem.embedding.contours.contour_points`.
     n_radii
-        Number of bins of distance.
+        Number of bins of distance; 5 in both publications.
     n_angles
-        Number of bins of direction.
+        Number of bins of direction; 12 in both publications.
     frame
         Where directions are measured from: the tangent, with the shape on the left, or axis 0.
     smoothing, holes, boundary
