@@ -14,6 +14,7 @@ from spem.errors import ParameterError, ShapeError
 from spem.rivals.mesh_sift import MeshSIFT, refine
 from spem.shapes.shape import Shape
 from spem.shapes.surface import Surface
+from spem.shapes.synthetic import box
 
 QUICK = MeshSIFT(min_vertices=500, n_scales=6)
 
@@ -97,9 +98,14 @@ def test_refinement_leaves_fine_meshes() -> None:
     np.testing.assert_array_equal(vertices, ball.vertices)
 
 
+def test_volumes_have_features() -> None:
+    """A shape without a mesh is described by the surface of its grid."""
+    assert len(MeshSIFT(min_vertices=100).describe(box((8.0, 12.0, 20.0), 1.0))) > 0
+
+
 def test_needs_a_surface() -> None:
     """A silhouette is refused by name."""
-    with pytest.raises(ShapeError, match=r"flat: meshSIFT"):
+    with pytest.raises(ShapeError, match=r"flat: .* 3 dimensions"):
         MeshSIFT().describe(Shape.from_mask(np.ones((3, 3)), name="flat"))
 
 

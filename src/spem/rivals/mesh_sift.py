@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import ParameterError, ShapeError
+from spem.errors import ParameterError
 from spem.rivals.curvature_scale_space import curvature_scale_space
 from spem.rivals.feature_matching import count_matches
 from spem.rivals.mesh_sift_features import keypoint_features
+from spem.shapes.boundary_surface import boundary_surface
 from spem.shapes.shape import Shape
 from spem.shapes.surface import Surface
 
@@ -97,9 +98,9 @@ class MeshSIFT:
         Raises
         ------
         ShapeError
-            When the shape has no surface.
+            When the shape is not of three dimensions.
         """
-        vertices, faces = refine(_surface_of(shape), self.min_vertices)
+        vertices, faces = refine(boundary_surface(shape), self.min_vertices)
         space = curvature_scale_space(
             vertices,
             faces,
@@ -158,11 +159,3 @@ def refine(surface: Surface, min_vertices: int) -> tuple[NDArray[np.float64], ND
     while len(vertices) < min_vertices:
         vertices, faces = subdivide_loop(vertices, faces, iterations=1)
     return np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
-
-
-def _surface_of(shape: Shape) -> Surface:
-    """Return the mesh of a shape."""
-    if shape.surface is None:
-        msg = f"{shape.name}: meshSIFT needs a surface, and the shape has none; read it from a mesh"
-        raise ShapeError(msg)
-    return shape.surface
