@@ -69,6 +69,7 @@ if TYPE_CHECKING:
     from spem.fields.walks.paths import sample_paths
     from spem.fields.walks.transient import Transient, solve_transient
     from spem.retrieval.classification import Classification, linear_svm
+    from spem.retrieval.diffusion import rerank
     from spem.retrieval.distances import correlation_distance, fuse
     from spem.retrieval.evaluation import PrecisionRecall, Scores, bulls_eye, precision_recall
     from spem.retrieval.ranking import Answer
@@ -162,6 +163,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "precision_recall",
     "read",
     "read_all",
+    "rerank",
     "sample_paths",
     "scale_invariant_signature",
     "screened_distance",
@@ -271,6 +273,7 @@ _HOME = {
     "precision_recall": "spem.retrieval.evaluation",
     "read": "spem.shapes.read",
     "read_all": "spem.shapes.read",
+    "rerank": "spem.retrieval.diffusion",
     "sample_paths": "spem.fields.walks.paths",
     "scale_invariant_signature": "spem.embedding.signatures",
     "screened_distance": "spem.fields.boundary_distance",
