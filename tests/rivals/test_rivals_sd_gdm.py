@@ -7,10 +7,11 @@ import pytest
 import trimesh
 
 from spem.errors import ShapeError
-from spem.rivals.sd_gdm import SDGDM, geodesic_matrix, largest_piece, largest_values, vertex_areas
+from spem.rivals.sd_gdm import SDGDM, geodesic_matrix, largest_values, vertex_areas
 from spem.shapes.read import read
 from spem.shapes.shape import Shape
 from spem.shapes.surface import Surface
+from spem.shapes.synthetic import ball, disk
 
 pytest.importorskip("potpourri3d")
 
@@ -20,8 +21,11 @@ def sphere(subdivisions: int = 3, stretch: tuple[float, float, float] = (1, 1, 1
     return Surface(np.array(mesh.vertices) * stretch, np.array(mesh.faces, np.int64))
 
 
-def shape_of(surface: Surface | None) -> Shape:
-    return Shape.from_mask(np.ones((2, 2, 2)), name="lump", surface=surface)
+def shape_of(surface: Surface) -> Shape:
+    """A solid of which the surface matters alone: its voxels fill the box around it."""
+    low, size = surface.vertices.min(axis=0), np.ptp(surface.vertices, axis=0)
+    step = tuple((size / 8).tolist())
+    return Shape.from_mask(np.ones((9, 9, 9)), step, origin=tuple(low.tolist()), surface=surface)
 
 
 def test_distances_on_the_unit_sphere_are_angles():
@@ -60,18 +64,6 @@ def test_place_scale_and_order_do_not_matter():
     assert other == pytest.approx(one, rel=1e-3)
 
 
-def test_only_the_largest_piece_counts():
-    """A speck beside the surface, and a vertex of no face, change nothing."""
-    surface, speck = sphere(2), sphere(1)
-    both = Surface(
-        np.concatenate([surface.vertices, 0.1 * speck.vertices + 5, [[9.0, 9, 9]]]),
-        np.concatenate([surface.faces, speck.faces + len(surface.vertices)]),
-    )
-    assert len(largest_piece(both).vertices) == len(surface.vertices)
-    one, other = (SDGDM(n_values=5).describe(shape_of(s)) for s in (surface, both))
-    assert np.array_equal(one, other)
-
-
 def test_iterated_values_are_those_of_the_whole_spectrum():
     """Above some size only the values that are wanted are computed."""
     distances, _ = geodesic_matrix(sphere(3), 10_000)
@@ -86,10 +78,16 @@ def test_comparison_is_the_mean_of_relative_differences():
     assert found == pytest.approx(np.array([[0, 0.5], [0.5, 0]]))
 
 
-def test_a_shape_without_surface_is_refused():
-    """The message names it."""
-    with pytest.raises(ShapeError, match="lump: has no surface"):
-        SDGDM().describe(shape_of(None))
+def test_a_solid_of_voxels_has_the_values_of_its_surface():
+    """Of a ball without a mesh the surface is taken from the grid."""
+    values = SDGDM(n_values=2, samples=200).describe(ball(1.0, 0.15)) * np.sqrt(4 * np.pi)
+    assert values == pytest.approx([np.pi / 2, np.pi / 8], rel=0.08)
+
+
+def test_a_silhouette_is_refused():
+    """It has no surface, and the message names it."""
+    with pytest.raises(ShapeError, match=r"disk.*surface is of shapes of 3 dimensions"):
+        SDGDM().describe(disk(3.0, 1.0))
 
 
 def test_areas_of_vertices_are_thirds_of_faces():

@@ -66,15 +66,20 @@ class Repeated:
         Standard error of the mean FT under another draw of classes.
     scores
         Scores of each seed.
-    distances
-        ``(n, n)`` distances of the first seed.
+    matrices
+        ``(n, n)`` distances of each seed.
     """
 
     mean: dict[str, float]
     deviation: dict[str, float]
     class_error: float
     scores: tuple[Scores, ...]
-    distances: NDArray[np.float64]
+    matrices: tuple[NDArray[np.float64], ...]
+
+    @property
+    def distances(self) -> NDArray[np.float64]:
+        """``(n, n)`` distances of the first seed."""
+        return self.matrices[0]
 
     def row(self) -> list[str]:
         """Return the five measures with one decimal."""
@@ -190,7 +195,7 @@ def summarise(matrices: Sequence[NDArray[np.float64]], labels: Sequence[str]) ->
         dict(zip(MEASURES, spread.tolist(), strict=True)),
         class_error(found),
         tuple(found),
-        matrices[0],
+        tuple(matrices),
     )
 
 
