@@ -7,10 +7,10 @@ import numpy as np
 from spem.codes.bands import Bands
 from spem.codes.settings import Settings
 from spem.embedding.shape_context import inner_distance_shape_context, shape_context
-from spem.errors import ParameterError
 from spem.shapes.shape import Shape
 
 N_POINTS = 128
+N_RADII = 8
 N_ANGLES = 8
 _CONTEXTS = {"shape-context": shape_context, "inner-distance": inner_distance_shape_context}
 
@@ -25,36 +25,27 @@ def contour_features(shape: Shape, settings: Settings, threads: int | None = Non
     shape
         A shape of two dimensions.
     settings
-        Kind of features, boundary model, and number of values: eight directions for each bin of distance.
+        Kind of features, and boundary model.
     threads
         Without effect: one shape takes milliseconds.
 
     Returns
     -------
     tuple
-        One band, ``(128, n_maps)`` in float32.
+        One band, ``(128, 64)`` in float32: eight distances by eight directions.
 
     Raises
     ------
     ShapeError
         When the shape is not of two dimensions.
-    ParameterError
-        When the number of values is no multiple of eight.
 
     Examples
     --------
     >>> from spem.shapes.synthetic import disk
-    >>> settings = Settings(features="shape-context", n_maps=64)
+    >>> settings = Settings(features="shape-context")
     >>> contour_features(disk(radius=10.0, spacing=1.0), settings)[0].shape
     (128, 64)
     """
-    if settings.n_maps % N_ANGLES:
-        msg = (
-            f"n_maps={settings.n_maps}: features {settings.features!r} have {N_ANGLES} directions for each "
-            f"distance; give a multiple of {N_ANGLES}"
-        )
-        raise ParameterError(msg)
     context = _CONTEXTS[settings.features]
-    n_radii = settings.n_maps // N_ANGLES
-    shares = context(shape, N_POINTS, n_radii=n_radii, n_angles=N_ANGLES, boundary=settings.boundary)
+    shares = context(shape, N_POINTS, n_radii=N_RADII, n_angles=N_ANGLES, boundary=settings.boundary)
     return (np.sqrt(shares).astype(np.float32),)
