@@ -108,6 +108,7 @@ def _weigh(points: Array, vertices: Array, faces: NDArray[np.int64], weights: Ar
     """Write the coordinates of each point to its row, which is zero before."""
     n = len(vertices)
     unit, distance = np.empty((n, 3)), np.empty(n)
+    normal, mean, share = np.empty((3, 3)), np.empty(3), np.empty(3)  # made once: room for one face
     for p in range(len(points)):
         nearest = 0
         for i in range(n):
@@ -123,15 +124,23 @@ def _weigh(points: Array, vertices: Array, faces: NDArray[np.int64], weights: Ar
             for k in range(3):
                 unit[i, k] /= distance[i]
         for f in range(len(faces)):
-            if _add_face(unit, distance, faces[f], weights[p]):
+            if _add_face(unit, distance, faces[f], weights[p], normal, mean, share):
                 break
         weights[p] /= weights[p].sum()
 
 
 @njit(cache=True, nogil=True)
-def _add_face(unit: Array, distance: Array, face: NDArray[np.int64], weights: Array) -> bool:
+def _add_face(
+    unit: Array,
+    distance: Array,
+    face: NDArray[np.int64],
+    weights: Array,
+    normal: Array,
+    mean: Array,
+    share: Array,
+) -> bool:
     """Add what a triangle gives to its corners; on it, give that alone and return True."""
-    normal, mean, share = np.empty((3, 3)), np.zeros(3), np.empty(3)
+    mean[:] = 0.0
     turn, largest = 0.0, 0.0
     for i in range(3):
         a, b = unit[face[(i + 1) % 3]], unit[face[(i + 2) % 3]]

@@ -1,0 +1,160 @@
+"""iHKS: heat kernel signatures of the boundary carried inside, as a bag of features."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
+from sklearn.cluster import KMeans
+
+from spem.errors import ParameterError, ShapeError
+from spem.fields.surface_spectrum import solve_surface_spectrum
+from spem.rivals.mean_value import carry_inside
+from spem.shapes.boundary_surface import boundary_surface
+from spem.shapes.shape import Shape
+from spem.shapes.surface import Surface
+
+Array = NDArray[np.float64]
+# Of a surface of unit area; the first value of the sphere is 25, and those of long shapes are smaller.
+_LOWEST = 5.0
+# Points that the vocabulary is learnt of, and the seed of their choice and of the k-means.
+_TRAINING, _SEED = 20_000, 0
+
+
+@dataclass(frozen=True)
+class IHKS:
+    """Interior heat kernel signatures h_t(x) = Σ_k exp(−λ_k t) φ_k(x)², gathered as a bag of features.
+
+    The publication: R. M. Rustamov, "Interpolated eigenfunctions for volumetric shape processing", The Visual
+    Computer 27 (2011) 951-961. λ_k and φ_k are eigenvalues and eigenfunctions of the boundary surface; φ_k is
+    carried inside by mean value coordinates. The bag of features is that of A. M. Bronstein, M. M. Bronstein,
+    L. J. Guibas, M. Ovsjanikov, "Shape Google", ACM Trans. Graph. 30 (2011): 48 words, soft assignment with σ
+    of twice the median distance of a point to its word, the mean over the points, L1 distance.
+
+    Deviations: the surface is scaled to unit area, and times are the same for all shapes, spread
+    logarithmically from that at which heat of the last eigenvalue is spent (4 ln 10 / λ with Weyl's estimate
+    λ = 4π n) to that of a value of 5. Each time is divided by its standard deviation over all points, lest
+    the short ones alone count. Numbers of eigenpairs, times and points are ours, as the publication's could
+    not be consulted in full: without the standard deviation first tiers on SHREC'11 are about six points
+    lower.
+
+    Time: 0.15 s a mesh of 250 vertices on one core, and 5 s to compare 600 shapes.
+
+    Parameters
+    ----------
+    n_pairs
+        Number of eigenpairs, the constant one among them.
+    n_times
+        Number of times t.
+    samples
+        Number of interior points, evenly spread over the numbers of the nodes; all nodes where there are
+        fewer.
+    n_words
+        Size of the vocabulary.
+    softness
+        σ of the soft assignment, in median distances of a point to its word; 0 assigns to the nearest alone.
+    standardised
+        Divide each time by its standard deviation.
+
+    Examples
+    --------
+    >>> from spem.shapes.synthetic import ball, box
+    >>> rival = IHKS(n_pairs=20, n_words=4, samples=50)
+    >>> shapes = [ball(1.0, 0.2), ball(2.0, 0.4), box((4.0, 1.0, 1.0), 0.2)]
+    >>> distances = rival.compare([rival.describe(shape) for shape in shapes])
+    >>> bool(distances[0, 1] < 1e-6 < distances[0, 2])
+    True
+    """
+
+    n_pairs: int = 100
+    n_times: int = 12
+    samples: int = 1000
+    n_words: int = 48
+    softness: float = 2.0
+    standardised: bool = True
+
+    @property
+    def name(self) -> str:
+        """Name in tables."""
+        return "iHKS"
+
+    @property
+    def times(self) -> Array:
+        """``(n_times,)`` times t, for a surface of unit area."""
+        spent = 4 * math.log(10)
+        return np.geomspace(spent / (4 * math.pi * self.n_pairs), spent / _LOWEST, self.n_times)
+
+    def describe(self, shape: Shape) -> NDArray[np.float32]:
+        """Compute the interior heat kernel signatures of points spread over the solid.
+
+        Parameters
+        ----------
+        shape
+            A shape of three dimensions.
+
+        Returns
+        -------
+        numpy.ndarray
+            ``(n_points, n_times)``, without a unit.
+
+        Raises
+        ------
+        ShapeError
+            When the shape has no boundary surface, or it has no area.
+        """
+        boundary = boundary_surface(shape)
+        if not boundary.area > 0:
+            msg = f"{shape.name}: its boundary surface has no area; mend the mesh"
+            raise ShapeError(msg)
+        scale = boundary.area**-0.5
+        unit = Surface(boundary.vertices * scale, boundary.faces)
+        spectrum = solve_surface_spectrum(unit, self.n_pairs, name=shape.name)
+        chosen = np.linspace(0, shape.n_nodes - 1, min(self.samples, shape.n_nodes)).round().astype(np.int64)
+        inside = carry_inside(spectrum.surface, spectrum.vectors, shape.points[chosen] * scale)
+        heat = np.square(inside) @ np.exp(-np.outer(spectrum.values, self.times))
+        return np.asarray(heat, np.float32)
+
+    def compare(self, descriptions: Sequence[Any]) -> Array:
+        """Compute the L1 distances between the shares of words in the shapes.
+
+        Parameters
+        ----------
+        descriptions
+            Signatures of each shape; the vocabulary is learnt of them.
+
+        Returns
+        -------
+        numpy.ndarray
+            ``(n_shapes, n_shapes)`` in [0, 2].
+
+        Raises
+        ------
+        ParameterError
+            When all shapes together have fewer points than words.
+        """
+        points = np.concatenate(descriptions).astype(np.float64)
+        if len(points) < self.n_words:
+            msg = (
+                f"n_words={self.n_words}: expected at most {len(points)}, the number of points of all shapes"
+            )
+            raise ParameterError(msg)
+        spread = np.maximum(points.std(axis=0), np.finfo(float).tiny) if self.standardised else 1.0
+        rng = np.random.default_rng(_SEED)
+        training = points[rng.permutation(len(points))[:_TRAINING]] / spread
+        words = KMeans(self.n_words, n_init=1, random_state=_SEED).fit(training).cluster_centers_
+        width = self.softness * float(np.median(cdist(training, words).min(axis=1)))
+        shares = np.stack([_shares(each / spread, words, width) for each in descriptions])
+        return np.asarray(cdist(shares, shares, "cityblock"))
+
+
+def _shares(points: Array, words: Array, width: float) -> Array:
+    """Return how much of each word the points of a shape have, in the mean; of width 0 the nearest alone."""
+    squared = cdist(points, words, "sqeuclidean")
+    squared -= squared.min(axis=1, keepdims=True)
+    weights = np.exp(-squared / (2 * max(width, 1e-9) ** 2))
+    return np.asarray((weights / weights.sum(axis=1, keepdims=True)).mean(axis=0))
