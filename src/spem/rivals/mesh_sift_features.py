@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from spem.rivals.curvature_scale_space import CurvatureScaleSpace
@@ -22,8 +23,8 @@ N_BINS = 8
 N_ENTRIES = 2 * N_BINS * N_REGIONS
 _N_ANGLES = 360
 _PEAK = 0.8
-_CENTRES = np.concatenate([[0.0], np.where(np.arange(8) % 2, np.sqrt(2), 1.0) * RING])
-_DIRECTIONS = np.concatenate([[0.0], np.arange(8) * np.pi / 4])
+# a square of regions about the keypoint, its sides and its corners
+_CENTRES = RING * np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]])
 
 
 def _smoothing() -> NDArray[np.complex128]:
@@ -91,10 +92,13 @@ def _describe(
     mean_slant = np.angle(tilt @ np.exp(1j * slant))
     slant, bearing = slant - mean_slant, bearing - mean_slant
     bent = weight * curvature.curvedness[near]
-    return [
-        _histograms(distance, bearing - turn, slant - turn, bins[near], bent, tilt)
-        for turn in _orientations(slant, tilt)
-    ]
+    found = []
+    for turn in _orientations(slant, tilt):
+        # geodesic polar coordinates as a plane
+        angle = bearing - turn
+        place = distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        found.append(_histograms(place, slant - turn, bins[near], bent, tilt))
+    return found
 
 
 def _angles(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -114,24 +118,38 @@ def _orientations(slant: NDArray[np.float64], tilt: NDArray[np.float64]) -> NDAr
 
 
 def _histograms(
-    distance: NDArray[np.float64],
-    bearing: NDArray[np.float64],
+    place: NDArray[np.float64],
     slant: NDArray[np.float64],
     shape_bin: NDArray[np.int64],
     bent: NDArray[np.float64],
     tilt: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Return the descriptor of one orientation, ``(144,)``."""
-    # law of cosines from polar coordinates about the keypoint
-    cosine = np.cos(bearing - _DIRECTIONS[:, None])
-    square = np.square(distance) + np.square(_CENTRES)[:, None] - 2 * _CENTRES[:, None] * distance * cosine
-    region, place = np.nonzero(square < REGION_RADIUS**2)
-    weight = np.exp(-square[region, place] / (2 * WEIGHT_WIDTH**2))
     slant_bin = np.floor(slant * (N_BINS / (2 * np.pi))).astype(np.int64) % N_BINS
-    n = N_REGIONS * N_BINS
-    shapes = np.bincount(region * N_BINS + shape_bin[place], weight * bent[place], n)
-    slants = np.bincount(region * N_BINS + slant_bin[place], weight * tilt[place], n)
+    shapes, slants = _daisy(place, _CENTRES, shape_bin, slant_bin, bent, tilt)
     return _unit(np.concatenate([_clipped(shapes), _clipped(slants)], axis=1)).reshape(-1)
+
+
+@njit(cache=True, nogil=True)
+def _daisy(
+    place: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    shape_bin: NDArray[np.int64],
+    slant_bin: NDArray[np.int64],
+    bent: NDArray[np.float64],
+    tilt: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the histograms of shape index and of slant of each region, ``(9, 8)`` each."""
+    shapes, slants = np.zeros((N_REGIONS, N_BINS)), np.zeros((N_REGIONS, N_BINS))
+    for i in range(len(place)):
+        for region in range(N_REGIONS):
+            x, y = place[i, 0] - centres[region, 0], place[i, 1] - centres[region, 1]
+            square = x * x + y * y
+            if square < REGION_RADIUS**2:
+                weight = np.exp(-square / (2 * WEIGHT_WIDTH**2))
+                shapes[region, shape_bin[i]] += weight * bent[i]
+                slants[region, slant_bin[i]] += weight * tilt[i]
+    return shapes, slants
 
 
 def _clipped(counts: NDArray[Any]) -> NDArray[np.float64]:

@@ -119,27 +119,27 @@ def _face_tensors(corners: NDArray[np.float64], normals: NDArray[np.float64]) ->
     edges = np.roll(corners, -1, axis=1) - corners
     turns = np.roll(normals, -1, axis=1) - normals
     frame = tangent_frames(_unit(np.cross(edges[:, 0], edges[:, 1])))
-    u = np.einsum("fij,fkj->fki", edges, frame)  # (f, 2, 3): axis, edge
-    t = np.einsum("fij,fkj->fki", turns, frame)
+    u = frame @ edges.transpose(0, 2, 1)  # (f, 2, 3): axis, edge
+    t = frame @ turns.transpose(0, 2, 1)
     zero = np.zeros_like(u[:, 0])
     # unknowns e, f, g of [[e, f], [f, g]]; two rows an edge
     design = np.concatenate(
         [np.stack([u[:, 0], u[:, 1], zero], axis=-1), np.stack([zero, u[:, 0], u[:, 1]], axis=-1)], axis=1
     )
-    normal_matrix = np.einsum("fri,frj->fij", design, design)
+    normal_matrix = design.transpose(0, 2, 1) @ design
     # slivers have no plane to fit in; a relative ridge leaves sound faces as they are
     ridge = 1e-10 * np.trace(normal_matrix, axis1=1, axis2=2) + np.finfo(float).tiny
     normal_matrix += ridge[:, None, None] * np.eye(3)
     rhs = np.einsum("fri,fr->fi", design, np.concatenate([t[:, 0], t[:, 1]], axis=1))
     e, f, g = np.linalg.solve(normal_matrix, rhs[..., None])[..., 0].T
     flat = np.stack([np.stack([e, f], axis=-1), np.stack([f, g], axis=-1)], axis=-2)
-    return np.asarray(np.einsum("fai,fab,fbj->fij", frame, flat, frame).reshape(-1, 9))
+    return np.asarray((frame.transpose(0, 2, 1) @ flat @ frame).reshape(-1, 9))
 
 
 def _principal(tensors: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the eigenvalues, larger first, of tensors restricted to the tangent planes."""
     frame = tangent_frames(normals)
-    flat = np.einsum("vai,vij,vbj->vab", frame, tensors, frame)
+    flat = frame @ tensors @ frame.transpose(0, 2, 1)
     half = (flat[:, 0, 0] + flat[:, 1, 1]) / 2
     spread = np.hypot((flat[:, 0, 0] - flat[:, 1, 1]) / 2, (flat[:, 0, 1] + flat[:, 1, 0]) / 2)
     return np.stack([half + spread, half - spread], axis=1)
