@@ -9,6 +9,7 @@ from spem.codes.bands import Bands
 from spem.codes.contour_features import contour_features
 from spem.codes.features import node_features, sweep_bands
 from spem.codes.settings import Settings
+from spem.codes.source_features import source_features
 from spem.codes.spectral import shape_spectrum, spectral_features
 from spem.codes.surface_features import surface_features
 from spem.errors import ParameterError
@@ -74,6 +75,7 @@ KINDS: Mapping[str, Maker] = MappingProxyType(
         "spem": _maps,
         **dict.fromkeys(("hks", "si-hks", "wks"), _signatures),
         **dict.fromkeys(("surface-hks", "surface-si-hks", "surface-wks"), surface_features),
+        "sources": source_features,
         **dict.fromkeys(("shape-context", "inner-distance"), contour_features),
     }
 )

@@ -39,7 +39,8 @@ class Traits:
 
 _OF_SWEEPS = ("rho_ranges", "scheme", "n_rho", "centred", "n_maps")
 _OF_SPECTRA = ("n_pairs", "n_maps")
-_CONTOUR: Mapping[str, Any] = MappingProxyType({**_USUAL, "n_maps": 40, "n_centers": 256})
+_CONTOUR: Mapping[str, Any] = MappingProxyType({**_USUAL, "n_maps": 64, "n_centers": 256})
+_SOURCES: Mapping[str, Any] = MappingProxyType({**_USUAL, "n_maps": 44, "n_centers": 256})
 TRAITS: Mapping[str, Traits] = MappingProxyType(
     {
         "spem": Traits("SPEM maps", own=_OF_SWEEPS),
@@ -49,6 +50,7 @@ TRAITS: Mapping[str, Traits] = MappingProxyType(
         "surface-hks": Traits("heat kernel signature of the surface", (3,), _OF_SPECTRA),
         "surface-si-hks": Traits("the same, invariant to scale", (3,), _OF_SPECTRA),
         "surface-wks": Traits("wave kernel signature of the surface", (3,), _OF_SPECTRA),
+        "sources": Traits("what pieces of the contour see of each other", (2,), defaults=_SOURCES),
         "shape-context": Traits("what each point of the contour sees", (2,), defaults=_CONTOUR),
         "inner-distance": Traits("the same, along ways inside", (2,), defaults=_CONTOUR),
     }
