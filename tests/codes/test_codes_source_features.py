@@ -21,9 +21,11 @@ SETTINGS = Settings(features="spem", n_maps=44)
 
 
 def test_one_band_with_a_row_for_each_arc() -> None:
-    """A silhouette has a hundred arcs of as many values as the settings name, in float32."""
+    """A silhouette has a hundred arcs and their mirror images, of as many values as asked for, in float32."""
     (band,) = source_features(disk(1.0, 0.03), SETTINGS)
-    assert band.shape == (N_PATCHES, 44)
+    assert band.shape == (2 * N_PATCHES, 44)
+    (plain,) = source_features(disk(1.0, 0.03), SETTINGS, mirrored=False)
+    assert np.array_equal(band[:N_PATCHES], plain)
     assert band.dtype == np.float32
     assert np.isfinite(band).all()
 
@@ -35,10 +37,21 @@ def test_units_and_place_change_nothing() -> None:
     assert np.allclose(source_features(shape, SETTINGS), source_features(moved, SETTINGS), atol=1e-4)
 
 
+def test_reflections_have_the_same_features() -> None:
+    """What all arcs of a shape see together is what those of its mirror image see; without them it is not."""
+    mask = np.ones((40, 28), bool)
+    mask[:18, :12] = mask[30:, 20:] = False
+    mask[:4] = False
+    shape, mirror = Shape.from_mask(mask), Shape.from_mask(mask[:, ::-1])
+    both = [source_features(each, SETTINGS)[0].mean(axis=0) for each in (shape, mirror)]
+    alone = [source_features(each, SETTINGS, mirrored=False)[0].mean(axis=0) for each in (shape, mirror)]
+    assert np.linalg.norm(both[0] - both[1]) < 0.5 * np.linalg.norm(alone[0] - alone[1])
+
+
 def test_holes_are_boundary_of_no_arc() -> None:
     """Arcs are those of the outer contour, in number its share, and see the hole as boundary."""
     (band,) = source_features(annulus(0.5, 1.0, 0.02), SETTINGS)
-    assert abs(len(band) - N_PATCHES * 2 / 3) < 4
+    assert abs(len(band) / 2 - N_PATCHES * 2 / 3) < 4
     (filled,) = source_features(disk(1.0, 0.02), SETTINGS)
     assert np.abs(band.mean(axis=0) - filled.mean(axis=0)).max() > 0.02
 
@@ -47,7 +60,7 @@ def test_holes_are_boundary_of_no_arc() -> None:
 def test_the_smallest_shapes_have_features(mask: np.ndarray) -> None:
     """A single pixel, two, four and a line have finite features."""
     (band,) = source_features(Shape.from_mask(mask), SETTINGS)
-    assert 4 <= len(band) <= N_PATCHES
+    assert 4 <= len(band) / 2 <= N_PATCHES
     assert np.isfinite(band).all()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spem.embedding.boundary_contexts import boundary_contexts, context_basis, departure_angles
+from spem.embedding.boundary_contexts import boundary_contexts, context_basis, departure_angles, mirror_signs
 from spem.embedding.boundary_response import BoundaryResponse, boundary_response
 from spem.errors import ParameterError, ShapeError
 from spem.fields.boundary.patches import patch_sources
@@ -72,6 +72,15 @@ def test_the_basis_is_orthonormal_and_smoothest_first() -> None:
         assert np.allclose(basis.T @ basis, np.eye(size))
         assert np.allclose(basis[:, 0], basis[0, 0])
     assert np.array_equal(context_basis(10), context_basis(60)[:, :10])
+
+
+def test_signs_turn_the_basis_into_its_mirror_image() -> None:
+    """Coefficients of reversed angles and places are those of the bins, times the signs."""
+    bins = (3, 4, 5, 6)
+    shares = np.random.default_rng(0).random(bins)
+    basis, size = context_basis(360, bins), 360
+    turned = shares[:, ::-1, ::-1, ::-1].reshape(size) @ basis
+    assert np.allclose(turned, mirror_signs(size, bins) * (shares.reshape(size) @ basis))
 
 
 def test_bad_input_is_refused() -> None:

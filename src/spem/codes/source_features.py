@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from spem.codes.bands import Bands
 from spem.codes.settings import Settings
-from spem.embedding.boundary_contexts import boundary_contexts, context_basis
+from spem.embedding.boundary_contexts import boundary_contexts, context_basis, mirror_signs
 from spem.embedding.boundary_response import boundary_response
 from spem.errors import ShapeError
 from spem.fields.boundary.patches import divide_points
@@ -30,6 +30,7 @@ def source_features(
     *,
     n_patches: int = N_PATCHES,
     rho: float = RHO,
+    mirrored: bool = True,
 ) -> Bands:
     """Compute the boundary contexts of the arcs of the longest contour, each in few numbers.
 
@@ -48,11 +49,14 @@ def source_features(
         Number of arcs that the contours are cut into, fewer where there are fewer boundary points.
     rho
         Screening length, in units of the shape's size.
+    mirrored
+        Whether each arc counts a second time as its mirror image, so that a shape and its reflection have
+        the same code; or else they differ.
 
     Returns
     -------
     tuple
-        One band, ``(n_arcs, n_maps)`` in float32.
+        One band, ``(n_arcs, n_maps)`` in float32, or twice as many rows with mirror images.
 
     Raises
     ------
@@ -65,7 +69,7 @@ def source_features(
     --------
     >>> from spem.shapes.synthetic import disk
     >>> source_features(disk(radius=20.0, spacing=1.0), Settings(features="spem", n_maps=44))[0].shape
-    (100, 44)
+    (200, 44)
     """
     if shape.ndim != 2:
         msg = f"{shape.name}: features 'sources' are of silhouettes; this shape has {shape.ndim} dimensions"
@@ -75,10 +79,12 @@ def source_features(
     arcs = divide_points(points, count)
     outer = arcs.select(np.flatnonzero(arcs.contour == 0))
     shares = boundary_contexts(boundary_response(outer, rho * shape.size))
-    return (np.ascontiguousarray(np.sqrt(shares) @ _basis(settings.n_maps), np.float32),)
+    basis, signs = _basis(settings.n_maps)
+    values = np.sqrt(shares) @ basis
+    return ((np.vstack([values, values * signs]) if mirrored else values).astype(np.float32),)
 
 
 @lru_cache(maxsize=4)
-def _basis(count: int) -> NDArray[np.float64]:
-    """Return the basis, made once for all shapes of a collection."""
-    return context_basis(count)
+def _basis(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the basis and its signs under reflection, made once for all shapes of a collection."""
+    return context_basis(count), mirror_signs(count)

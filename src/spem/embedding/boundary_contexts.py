@@ -101,6 +101,36 @@ def departure_angles(response: BoundaryResponse) -> Array:
     return np.asarray(np.arccos(np.clip(-slope, -1.0, 1.0)))
 
 
+def mirror_signs(count: int, bins: Bins = DEFAULT_BINS) -> Array:
+    """Return what a reflection of the shape multiplies the coefficients of `context_basis` with.
+
+    It turns the contour round: angles a become π − a, and places s become 1 − s.
+
+    Parameters
+    ----------
+    count, bins
+        As `context_basis` takes them.
+
+    Returns
+    -------
+    NDArray
+        ``(count,)`` 1 and −1.
+
+    Raises
+    ------
+    ParameterError
+        When there are fewer bins than functions asked for.
+
+    Examples
+    --------
+    >>> mirror_signs(5).tolist()
+    [1.0, 1.0, -1.0, -1.0, -1.0]
+    """
+    basis = context_basis(count, bins).reshape(*bins, count)
+    reflected = basis[:, ::-1, ::-1, ::-1]
+    return np.asarray(np.sign(np.einsum("abcdk,abcdk->k", basis, reflected)))
+
+
 def context_basis(count: int, bins: Bins = DEFAULT_BINS) -> Array:
     """Return orthonormal functions on the bins, the smoothest first: cosines, and waves around the contour.
 
