@@ -1,4 +1,8 @@
-"""Geodesic distances around a vertex of a triangle surface, by fast marching."""
+"""Geodesic distances around a vertex of a triangle surface, by fast marching.
+
+Hundreds of small disks are wanted of each surface: the heat method of potpourri3d, which factors it at each
+scale and covers all of it, took five times longer.
+"""
 
 from __future__ import annotations
 

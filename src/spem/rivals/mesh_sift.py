@@ -38,12 +38,15 @@ class MeshSIFT:
     each vertex as well; distances to the centres of the outer regions follow from geodesic polar coordinates
     about the keypoint instead of fast marching from each centre.
 
+    Time: 0.4 s a shape (252 vertices, refined to 4,002, some 350 features) and 0.7 ms a pair, on one core.
+
     Parameters
     ----------
     min_vertices
         A mesh is subdivided until it has as many vertices.
     first_steps
-        Number of smoothing steps of the first scale; the published 5 is for meshes of about 10,000 vertices.
+        Number of smoothing steps of the first scale. The authors' 5 is for meshes of about 10,000 vertices;
+        on 4,000 two steps reach as far.
     scales_per_octave
         Number of scales until the steps have doubled.
     n_scales
