@@ -57,6 +57,16 @@ def test_no_more_points_than_wanted() -> None:
     assert IHKS(n_pairs=10, samples=10_000).describe(shape).shape == (shape.n_nodes, 12)
 
 
+def test_another_component_is_left_out() -> None:
+    """Points of a component that the surface does not enclose are no points of the description."""
+    index = np.stack(np.indices((28, 13, 13)), axis=-1)
+    large, small = (np.sum(np.square(index - c), axis=-1) < 30 for c in ([6, 6, 6], [21, 6, 6]))
+    small &= index[..., 0] < 21
+    rival = IHKS(n_pairs=10, samples=10_000)
+    both = rival.describe(Shape.from_mask(large | small))
+    assert both == pytest.approx(rival.describe(Shape.from_mask(large)), rel=1e-3)
+
+
 def test_shapes_of_one_word_each_are_as_far_as_can_be() -> None:
     """Shapes without a common word are at distance 2, equal ones at 0; softness brings them nearer."""
     one, two = np.zeros((5, 2)), np.ones((5, 2))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
@@ -22,6 +23,8 @@ from spem.shapes.surface import Surface
 Array = NDArray[np.float64]
 # Of a surface of unit area; the first value of the sphere is 25, and those of long shapes are smaller.
 _LOWEST = 5.0
+# A surface with holes turns once around a point inside but for the holes.
+_WITHIN = 0.5
 # Points that the vocabulary is learnt of, and the seed of their choice and of the k-means.
 _TRAINING, _SEED = 20_000, 0
 
@@ -53,7 +56,7 @@ class IHKS:
         Number of times t.
     samples
         Number of interior points, evenly spread over the numbers of the nodes; all nodes where there are
-        fewer.
+        fewer. Nodes outside the surface, in another component, are left out.
     n_words
         Size of the vocabulary.
     softness
@@ -105,19 +108,26 @@ class IHKS:
         Raises
         ------
         ShapeError
-            When the shape has no boundary surface, or it has no area.
+            When the shape has no boundary surface, or none of its points lies within it.
         """
         boundary = boundary_surface(shape)
-        if not boundary.area > 0:
-            msg = f"{shape.name}: its boundary surface has no area; mend the mesh"
-            raise ShapeError(msg)
         scale = boundary.area**-0.5
         unit = Surface(boundary.vertices * scale, boundary.faces)
         spectrum = solve_surface_spectrum(unit, self.n_pairs, name=shape.name)
-        chosen = np.linspace(0, shape.n_nodes - 1, min(self.samples, shape.n_nodes)).round().astype(np.int64)
-        inside = carry_inside(spectrum.surface, spectrum.vectors, shape.points[chosen] * scale)
+        points = self._points(shape, boundary) * scale
+        inside = carry_inside(spectrum.surface, spectrum.vectors, points)
         heat = np.square(inside) @ np.exp(-np.outer(spectrum.values, self.times))
         return np.asarray(heat, np.float32)
+
+    def _points(self, shape: Shape, boundary: Surface) -> Array:
+        """Return nodes spread over the solid; of several components those in the one with the surface."""
+        chosen = np.linspace(0, shape.n_nodes - 1, min(self.samples, shape.n_nodes)).round().astype(np.int64)
+        points = shape.points[chosen]
+        within = igl.fast_winding_number(boundary.vertices, boundary.faces, points) > _WITHIN
+        if not within.any():
+            msg = f"{shape.name}: none of {chosen.size} nodes lies within its boundary surface; mend the mesh"
+            raise ShapeError(msg)
+        return np.asarray(points[within])
 
     def compare(self, descriptions: Sequence[Any]) -> Array:
         """Compute the L1 distances between the shares of words in the shapes.

@@ -29,7 +29,8 @@ def mean_value_coordinates(surface: Surface, points: ArrayLike) -> Array:
     Parameters
     ----------
     surface
-        Closed, its faces turned alike.
+        Closed, its faces turned alike. With holes, linear functions are reproduced but for what the holes
+        take of the view.
     points
         ``(n_points, 3)`` anywhere; on the surface the coordinates are those of the face.
 
