@@ -63,7 +63,9 @@ def test_collections_are_skipped_without_data(tmp_path):
     assert [reason.split(":")[0] for reason in result["skipped"]] == ["tari1000", "shrec11"]
 
 
-@pytest.mark.parametrize("name", ["codes_study", "pose_consistency", "retrieval", "rivals", "sparse_coding"])
+@pytest.mark.parametrize(
+    "name", ["codes_study", "pose_consistency", "retrieval", "rivals", "silhouettes", "sparse_coding"]
+)
 def test_real_shapes_are_skipped_without_data(name, tmp_path):
     """Without the shapes that a benchmark is of there is no figure, only the reasons."""
     result = _run(name, tmp_path, SPEM_DATA=str(tmp_path / "absent"))
