@@ -122,9 +122,9 @@ def test_poses_of_real_shapes_are_nearest_to_each_other(data_dir: Path) -> None:
     rows = [line.split(",") for line in (data_dir / "shrec11" / "labels.csv").read_text().split()[1:]]
     kinds = {"ants": [], "hand": [], "snake": []}
     for file, label in rows:
-        if label in kinds and len(kinds[label]) < 3:
+        if label in kinds and len(kinds[label]) < 2:
             kinds[label].append(file)
-    rival = MdsCmBof(n_words=200, side=128)
+    rival = MdsCmBof(n_words=200, side=96)
     shapes = [read(data_dir / "shrec11" / file, voxels=500) for files in kinds.values() for file in files]
     distances = rival.compare([rival.describe(shape) for shape in shapes])
-    assert evaluate(distances, [kind for kind in kinds for _ in range(3)]).mean()["NN"] == 100
+    assert evaluate(distances, [kind for kind in kinds for _ in range(2)]).mean()["NN"] == 100
