@@ -42,11 +42,11 @@ class IHKS:
     Deviations: the surface is scaled to unit area, and times are the same for all shapes, spread
     logarithmically from that at which heat of the last eigenvalue is spent (4 ln 10 / λ with Weyl's estimate
     λ = 4π n) to that of a value of 5. Each time is divided by its standard deviation over all points, lest
-    the short ones alone count. Numbers of eigenpairs, times and points are ours, as the publication's could
-    not be consulted in full: without the standard deviation first tiers on SHREC'11 are about six points
-    lower.
+    the short ones alone count; that is worth a point of first tier on SHREC'11, soft assignment three, and a
+    thousand points in place of 333 one. Numbers of eigenpairs, times and points are ours: what the
+    publication took is not known.
 
-    Time: 0.15 s a mesh of 250 vertices on one core, and 5 s to compare 600 shapes.
+    Time: 0.11 s a mesh of 250 vertices on one core, 3 s one of 8,400, and 0.5 s to compare 600 shapes.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ class ShapeDNA:
     place of cubic ones on the mesh; both tend to the spectrum of the polyhedron. A solid is solved on its
     voxels with the surface where it cuts them, its value zero on the boundary, in place of tetrahedra.
 
-    Time: 0.07 s a mesh of 250 vertices on one core, and 1 s a solid of 15,000 voxels.
+    Time: 0.02 s a mesh of 250 vertices on one core, 0.05 s for 50 values, and 1 s a solid of 15,000 voxels.
 
     Parameters
     ----------
