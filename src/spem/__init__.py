@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from spem.embedding.heat import diffusion_distance, heat_kernel
     from spem.embedding.maps import Maps
     from spem.embedding.nodal import nodal_clusters, nodal_domains, nodal_thresholds
+    from spem.embedding.shape_context import inner_distance_shape_context, shape_context
     from spem.embedding.signatures import (
         heat_kernel_signature,
         scale_invariant_signature,
@@ -145,6 +146,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "heat_kernel",
     "heat_kernel_signature",
     "hu_moments",
+    "inner_distance_shape_context",
     "inner_distances",
     "iso_contours",
     "iso_surfaces",
@@ -168,6 +170,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "scale_invariant_signature",
     "screened_distance",
     "search",
+    "shape_context",
     "shared_times",
     "shared_values",
     "signed_distance_shape",
@@ -255,6 +258,7 @@ _HOME = {
     "heat_kernel": "spem.embedding.heat",
     "heat_kernel_signature": "spem.embedding.signatures",
     "hu_moments": "spem.codes.moments",
+    "inner_distance_shape_context": "spem.embedding.shape_context",
     "inner_distances": "spem.fields.geodesics",
     "iso_contours": "spem.fields.isocontours",
     "iso_surfaces": "spem.fields.isocontours",
@@ -278,6 +282,7 @@ _HOME = {
     "scale_invariant_signature": "spem.embedding.signatures",
     "screened_distance": "spem.fields.boundary_distance",
     "search": "spem.collections",
+    "shape_context": "spem.embedding.shape_context",
     "shared_times": "spem.embedding.signatures",
     "shared_values": "spem.embedding.signatures",
     "signed_distance_shape": "spem.shapes.levels",
