@@ -58,20 +58,19 @@ def test_mirrored_descriptors_are_those_of_mirrored_images() -> None:
     assert np.array_equal(mirror(mirror(plain.descriptors)), plain.descriptors)
 
 
-@pytest.mark.parametrize("mirrored", [False, True])
-def test_distances_do_not_change_with_a_quarter_turn(mirrored: bool) -> None:
-    """A turned or mirrored shape is far nearer to itself than to another shape."""
-    quarter = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, -1.0 if mirrored else 1.0]])
-    rival = MdsCmBof(n_words=100, side=96)
-    described = [rival.describe(shape) for shape in (tube(0.8), tube(0.8, quarter), tube(0.0))]
-    found = rival.compare(described)
-    assert found[0, 1] < 0.4 * found[0, 2]
+def test_distances_do_not_change_with_a_quarter_turn() -> None:
+    """A turned shape and a mirrored one are far nearer to the shape than another shape is."""
+    quarter = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    rival = MdsCmBof(n_words=100, side=64)
+    shapes = tube(0.8), tube(0.8, quarter), tube(0.8, -quarter), tube(0.0)
+    found = rival.compare([rival.describe(shape) for shape in shapes])
+    assert found[0, 1:3].max() < 0.4 * found[0, 3]
     assert not found.diagonal().any()
 
 
 def test_the_same_shapes_give_the_same_distances() -> None:
     """Describing and comparing twice agree to the last bit."""
-    rival = MdsCmBof(n_words=20, side=64)
+    rival = MdsCmBof(n_words=20, side=32)
     first, second = (rival.compare([rival.describe(tube(b)) for b in (0.0, 0.8)]) for _ in range(2))
     assert np.array_equal(first, second)
 
