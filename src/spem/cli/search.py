@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from spem.codes.codes import Codes
     from spem.retrieval.evaluation import Scores
 
+# Shapes that each is joined to in diffusion, fewer in a small collection.
+NEIGHBOURS = 10
 REPORT = "report.html"
 
 
@@ -64,6 +66,9 @@ def evaluate(
     labels: Annotated[
         Path, typer.Option(metavar="FILE", help="Lines 'file,label', or a Princeton classification (.cla).")
     ],
+    rerank: Annotated[
+        bool, typer.Option("--rerank", help="Score again after diffusion re-ranking, and tell both.")
+    ] = False,
     json: Annotated[
         Path | None,
         typer.Option(
@@ -91,7 +96,8 @@ def evaluate(
 
     NN, FT, ST, E and DCG in percent, each shape being a query in turn, and the bull's-eye score.
     A file is labelled by its path or name; each shape of a label volume by its own, such as teeth-3.
-    With --split also how often a linear support vector machine gives a test shape its class.
+    With --split also how often a linear support vector machine gives a test shape its class; with --rerank
+    the scores after diffusion over the neighbourhoods of the collection too, apart from the others.
 
     \b
     Examples:
@@ -107,11 +113,18 @@ def evaluate(
         check_folder(report)
     from spem.codes.workers import count_processes
     from spem.retrieval.distances import correlation_distance
+    from spem.retrieval.evaluation import evaluate as score_distances
 
     collection, classes = _load_labelled(codes, labels, ignore_unlabelled=ignore_unlabelled)
     distances = correlation_distance(collection.vectors, collection.vectors)
     scores = score(distances, classes)
     facts = summary(scores)
+    if rerank:
+        from spem.retrieval.diffusion import rerank as diffused
+
+        neighbours = min(NEIGHBOURS, len(classes) - 1)
+        reranked = score_distances(diffused(distances, n_neighbours=neighbours), classes)
+        facts["after_diffusion"] = {**reranked.mean(), "bulls_eye": reranked.bulls_eye}
     if split is not None:
         facts["classification"] = classification(collection, classes, split, repeats, seed)
     _tell(facts, json)
@@ -219,6 +232,11 @@ def print_scores(facts: dict[str, Any]) -> None:
     classes = "1 class" if facts["n_classes"] == 1 else f"{facts['n_classes']} classes"
     typer.echo(f"{counted(facts['n_shapes'], 'shape')} in {classes}, percent")
     print_table(tuple(columns.values()), [tuple(f"{facts[name]:.1f}" for name in columns)])
+    if "after_diffusion" in facts:
+        typer.echo("after diffusion re-ranking")
+        print_table(
+            tuple(columns.values()), [tuple(f"{facts['after_diffusion'][name]:.1f}" for name in columns)]
+        )
     if "classification" in facts:
         told = facts["classification"]
         splits = counted(told["repeats"], "split")
