@@ -17,7 +17,7 @@ from spem.shapes.read import read
 from spem.shapes.shape import Shape
 from spem.shapes.synthetic import annulus, ball, disk, star_polygon
 
-SETTINGS = Settings(features="sources", n_maps=44)
+SETTINGS = Settings(features="spem", n_maps=44)
 
 
 def test_one_band_with_a_row_for_each_arc() -> None:
@@ -75,7 +75,7 @@ def test_bad_input_is_refused() -> None:
     with pytest.raises(ShapeError, match="'sources' are of silhouettes; this shape has 3 dimensions"):
         source_features(ball(1.0, 0.25), SETTINGS)
     with pytest.raises(ParameterError, match="expected at least 1 and at most one for each bin"):
-        source_features(disk(1.0, 0.1), replace(SETTINGS, n_maps=600))
+        source_features(disk(1.0, 0.1), replace(SETTINGS, n_maps=600, n_rho=600))
 
 
 @pytest.mark.data

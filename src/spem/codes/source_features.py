@@ -68,7 +68,7 @@ def source_features(
     Examples
     --------
     >>> from spem.shapes.synthetic import disk
-    >>> source_features(disk(radius=20.0, spacing=1.0), Settings(features="sources", n_maps=44))[0].shape
+    >>> source_features(disk(radius=20.0, spacing=1.0), Settings(features="spem", n_maps=44))[0].shape
     (200, 44)
     """
     if shape.ndim != 2:
