@@ -47,6 +47,7 @@ CODES = (
     "inner-distance",
     "shape-context+inner-distance",
     "spem+shape-context+inner-distance",
+    "sources+shape-context+inner-distance",
     "auto",
 )
 RIVALS: tuple[Rival, ...] = (Hu(), Zernike(), EllipticFourier())
