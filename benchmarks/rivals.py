@@ -3,7 +3,7 @@
 spectralbrain 0.1.0 at the best setting known of it: wave kernel signatures at 100 energies that all shapes
 share, each z-scored over the collection, and a Fisher vector over 32 Gaussians. It gets the eigenpairs of our
 solver, and like ours its vocabulary is learnt on the shapes that are searched. Shape-DNA with reweighted
-values needs none. Differences of first tiers are paired: all rank the same queries, and their standard error is
+values needs none. Differences of first tiers are paired: all rank the same queries. Their standard error is
 by resampling the classes. Times are of one core, reading left out.
 """
 
