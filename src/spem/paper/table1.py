@@ -29,8 +29,6 @@ PUBLISHED: Mapping[str, tuple[float, ...]] = MappingProxyType(
 BEST = "SPEM+SD-GDM"
 # Points of FT within which a system counts as the one that was published: the classes alone make 1.2.
 NEAR = 2.0
-# Why a system is further from its published row than that, as measured.
-REASONS: Mapping[str, str] = MappingProxyType({})
 
 
 def row_claim(name: str, row: Row, *, judgeable: bool, absent: str) -> Claim:
@@ -54,7 +52,7 @@ def row_claim(name: str, row: Row, *, judgeable: bool, absent: str) -> Claim:
         f"{published:.1f}",
         f"{tier:.1f}" if judgeable and row.scored else "not measured",
         tier >= published - NEAR,
-        note=(row.failure or REASONS.get(name, "Not explained.")) if judgeable else absent,
+        note=(row.failure or _reason(name)) if judgeable else absent,
         tested=judgeable and row.scored is not None,
     )
 
@@ -189,3 +187,9 @@ def _tier(found: Measured, name: str) -> float:
     """Return the first tier of a system, with one decimal; of one that was not run nothing."""
     scored = found.rows[name].scored
     return round(scored.mean["FT"], 1) if scored else 0.0
+
+
+def _reason(name: str) -> str:
+    """Say where a system that falls short differs from its publication."""
+    parts = [part for part in name.split("+") if part in RIVALS]
+    return " ".join(f"{part}: {deviations(part)}" for part in parts)
