@@ -48,7 +48,7 @@ from spem.retrieval.evaluation import evaluate
 from spem.shapes.creatures import creature, creature_kinds
 from spem.shapes.shape import Shape
 
-SEEDS, OWN_SEEDS, NODES, CREATURES_EACH, MOST_MAPS = 3, 2, 2000, 8, 16
+SEEDS, OWN_SEEDS, NODES, CREATURES_EACH, MOST_MAPS = 3, 2, 3000, 8, 16
 QUICK_CLASSES, QUICK_EACH = 4, 4
 DEFAULT, KEPT, JOINED = "default", "4 levels", "4 levels + surface"
 COLLECTIONS = {"shrec11": 3, "tari1000": 2, "kimia216": 2}
