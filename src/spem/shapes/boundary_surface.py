@@ -127,8 +127,8 @@ def _hole_area(surface: Surface) -> float:
     graph = coo_array((np.ones(one.size, bool), (one, two)), shape=(vertices.size,) * 2)
     n_loops, loop = connected_components(graph, directed=False)
     place = surface.vertices[vertices]
-    middle = np.stack([np.bincount(loop, x, n_loops) for x in place.T], axis=1)
-    middle = middle / np.bincount(loop, minlength=n_loops)[:, None]
+    sums = np.stack([np.bincount(loop, x, n_loops) for x in place.T], axis=1)
+    middle = sums / np.bincount(loop, minlength=n_loops)[:, None]
     cross = np.cross(place[one] - middle[loop[one]], place[two] - middle[loop[one]])
     return float(np.linalg.norm(cross, axis=1).sum() / 2)
 
