@@ -95,8 +95,10 @@ def _kept_part(shape: Shape, mesh: Surface) -> tuple[Surface, str]:
     if volume.size == 1:
         return _compact(mesh), ""
     place = (mesh.vertices - np.asarray(shape.origin)) / np.asarray(shape.spacing)
-    index = np.clip(np.rint(place).astype(np.int64), 0, np.asarray(shape.mask.shape) - 1)
-    beside = ndimage.binary_dilation(shape.mask, np.ones((3, 3, 3), bool))[tuple(index[mesh.faces[:, 0]].T)]
+    index = np.rint(place[mesh.faces[:, 0]]).astype(np.int64)
+    last = np.asarray(shape.mask.shape) - 1
+    near = ndimage.binary_dilation(shape.mask, np.ones((3, 3, 3), bool))
+    beside = ((index >= 0) & (index <= last)).all(axis=1) & near[tuple(np.clip(index, 0, last).T)]
     share = np.bincount(part, beside, volume.size) / np.bincount(part, minlength=volume.size)
     solids = np.flatnonzero((share >= _BESIDE_SHARE) & (volume > 0))
     if solids.size != 1:
