@@ -38,7 +38,7 @@ class SDGDM:
     any scale. Fifty values, where the first publication has nineteen: chosen by score on SHREC'11. Vertices
     are the points where there are no more than `samples`, farthest points otherwise.
 
-    Time: 20 ms a mesh of 250 vertices on one core; with 2,500 points of a mesh of 8,400 vertices some 15 s.
+    Time: 0.04 s a mesh of 250 vertices on one core, 0.8 s one of 1,500.
 
     Parameters
     ----------
