@@ -32,9 +32,9 @@ def model():
 
 def test_model_codes_as_the_estimator_does(model):
     """A model's codes are those of VLAD with the same parameters."""
-    expected = VLAD(4, random_state=0).fit(shapes()).transform(shapes(1))
+    expected = VLAD(4, levels=4, random_state=0).fit(shapes()).transform(shapes(1))
     np.testing.assert_allclose([model.encode(bands) for bands in shapes(1)], expected, atol=1e-6)
-    assert model.n_code == 48
+    assert model.n_code == 192
 
 
 def test_saved_model_is_the_same_model(model, tmp_path):
@@ -47,14 +47,29 @@ def test_saved_model_is_the_same_model(model, tmp_path):
         np.testing.assert_array_equal(loaded.encode(bands), model.encode(bands))
 
 
-def test_model_from_before_kinds_of_features_is_one_of_maps(model, tmp_path):
+def test_model_from_before_kinds_of_features_is_one_of_maps(tmp_path):
     """A file without the newer settings gives the model that it gave, and the same codes."""
+    settings = Settings(features="spem", n_maps=3, n_centers=4, rho_ranges=SETTINGS.rho_ranges, levels=1)
+    model = Model.fit(settings, shapes())
+    late = ("features", "n_pairs", "levels")
     header = model.to_header()
-    header["settings"] = {k: v for k, v in header["settings"].items() if k not in ("features", "n_pairs")}
+    header["settings"] = {k: v for k, v in header["settings"].items() if k not in late}
     write_container(tmp_path / "old.spem", "model", header, model.to_arrays())
     loaded = Model.load(tmp_path / "old.spem")
     assert loaded.settings == model.settings
     np.testing.assert_array_equal(loaded.encode(shapes(2)[0]), model.encode(shapes(2)[0]))
+
+
+def test_small_collections_have_fewer_words():
+    """Where no number is asked for: 64 training nodes for each, no fewer than eight; the file has them."""
+    few = Model.fit(Settings(features="spem", n_maps=3), [bands[:1] for bands in shapes()])
+    asked = Model.fit(Settings(features="spem", n_maps=3, n_centers=20), [bands[:1] for bands in shapes()])
+    assert (few.parts[0].n_centers, asked.parts[0].n_centers) == (8, 20)
+    rng = np.random.default_rng(0)
+    many = Model.fit(Settings(features="spem", n_maps=3), [rng.random((500, 3)) for _ in range(4)])
+    assert many.parts[0].n_centers == 31
+    again = Model.from_parts(many.to_header(), many.to_arrays(), "file")
+    assert (again.digest, again.n_code) == (many.digest, 4 * 2 * 31 * 3)
 
 
 def test_digest_tells_settings_and_vocabularies_apart(model):
@@ -137,7 +152,7 @@ def test_joined_model_adds_the_distances_of_its_parts():
     parts = [np.stack([each.encode(bands[i]) for bands in shapes(1)]) for i, each in enumerate(alone)]
     expected = sum(w * correlation_distance(p, p) for w, p in zip(model.weights, parts, strict=True))
     np.testing.assert_allclose(correlation_distance(joined, joined), expected, atol=1e-6)
-    assert model.n_code == joined.shape[1] == 48
+    assert model.n_code == joined.shape[1] == 96 + 24
     assert sum(model.weights) == pytest.approx(1)
 
 

@@ -168,6 +168,14 @@ def test_same_seed_same_codes_and_other_seed_others():
     assert np.abs(first - other).max() > 0.01
 
 
+def test_words_take_a_number_of_nodes_each():
+    """Of 600 nodes thirty words of 20 nodes, never more than asked for nor fewer than eight."""
+    shapes = [np.random.default_rng(i).random((200, 2)) for i in range(3)]
+    for least, expected in ((1, 40), (15, 40), (20, 30), (300, 8)):
+        made = VLAD(40, nodes_per_center=least, random_state=0).fit(shapes)
+        assert len(made.vocabularies_[0].cluster_centers_) == expected
+
+
 def test_codes_as_a_data_frame_with_named_columns():
     """Pandas output has one named column for each entry of a code."""
     learner = VLAD(2, random_state=0).set_output(transform="pandas")

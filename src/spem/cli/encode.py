@@ -71,7 +71,10 @@ def encode(
     n_maps: Annotated[
         int | None, typer.Option(min=1, help="Maps of each range; values of a signature. [8]")
     ] = None,
-    n_centers: Annotated[int | None, typer.Option(min=1, help="Centres of the vocabulary. [64]")] = None,
+    n_centers: Annotated[
+        int | None,
+        typer.Option(min=1, help="Centres of each vocabulary. [64; 128 of contours; fewer of few shapes]"),
+    ] = None,
     power: Annotated[
         float | None, typer.Option(help="Exponent of the residuals, α of (5.3), 0 to 1. [0.5]")
     ] = None,
@@ -84,6 +87,9 @@ def encode(
     ] = None,
     moments: Annotated[
         int | None, typer.Option(help="Moments of the residuals in a code, 1 or 2. [2]")
+    ] = None,
+    levels: Annotated[
+        int | None, typer.Option(min=1, help="Levels of the first map that are summed apart. [4]")
     ] = None,
     drop_boundary: Annotated[
         bool | None, typer.Option("--drop-boundary/--keep-boundary", help="Leave out nodes at the boundary.")
@@ -133,6 +139,7 @@ def encode(
         power=power,
         scaling=scaling,
         moments=moments,
+        levels=levels,
         drop_boundary=drop_boundary,
         threshold=threshold,
         dark=dark,

@@ -89,7 +89,7 @@ def encode_collection(
     >>> squares = [Shape.from_mask(np.ones((n, n)), name=f"square {n}") for n in (9, 12)]
     >>> codes = encode_collection(squares, Settings(features="spem", voxels=None, n_maps=2, n_centers=4))
     >>> codes.names, codes.vectors.shape
-    (('square 9', 'square 12'), (2, 16))
+    (('square 9', 'square 12'), (2, 64))
     """
     if not sources:
         msg = "no sources were given; give files or shapes"
@@ -140,7 +140,7 @@ def encode_file(source: str | Path | Shape, model: Model) -> NDArray[np.float32]
     >>> settings = Settings(features="spem", voxels=None, n_maps=2, n_centers=4)
     >>> model = encode_collection([square], settings).model
     >>> encode_file(square, model).shape
-    (16,)
+    (64,)
     """
     with threadpool_limits(1):
         entries = _entries(as_source(source), model.settings, model)

@@ -74,7 +74,7 @@ class Model:
         >>> rng = np.random.default_rng(0)
         >>> settings = Settings(features="spem", n_maps=2, n_centers=4)
         >>> Model.fit(settings, [rng.random((50, 2)) for _ in range(3)])
-        Model(..., 1 band, 4 centres, 2 maps, codes of length 16)
+        Model(..., 1 band, 4 centres, 2 maps, codes of length 64)
         """
         resolved = settings.resolved(ndim)
         chosen = resolved.parts(ndim)
@@ -218,9 +218,11 @@ class Model:
                 for part, weight in zip(self.parts, self.weights, strict=True)
             )
             return f"Model({self.digest}, {of}, codes of length {self.n_code})"
-        s, n_bands = self.parts[0].settings, len(self.parts[0].centers)
+        n_bands = len(self.parts[0].centers)
         bands = f"{n_bands} band{'s' if n_bands > 1 else ''}"
-        size = f"{s.n_centers} centres, {self.parts[0].n_values} maps, codes of length {self.n_code}"
+        size = (
+            f"{self.parts[0].n_centers} centres, {self.parts[0].n_values} maps, codes of length {self.n_code}"
+        )
         return f"Model({self.digest}, {bands}, {size})"
 
 

@@ -22,7 +22,7 @@ CODE_FORMAT = 1
 
 Components = Literal["largest", "all"]
 # Settings that came later, and what files from before them mean.
-_ADDED: dict[str, Any] = {"features": "spem", "n_pairs": 100}
+_ADDED: dict[str, Any] = {"features": "spem", "n_pairs": 100, "levels": 1}
 _CHOICES = {
     "boundary": Boundary,
     "scheme": Scheme,
@@ -30,7 +30,9 @@ _CHOICES = {
     "scaling": Scaling,
 }
 _CHECKS: dict[str, Callable[[str, Any], Any]] = {
-    **dict.fromkeys(("voxels", "n_rho", "n_pairs", "n_maps", "n_centers", "nodes_per_shape"), whole_number),
+    **dict.fromkeys(
+        ("voxels", "n_rho", "n_pairs", "n_maps", "n_centers", "levels", "nodes_per_shape"), whole_number
+    ),
     "moments": partial(whole_number, largest=2),
     # k-means takes seeds of 32 bits.
     "seed": partial(whole_number, least=0, largest=2**32 - 1),
@@ -38,7 +40,7 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     **dict.fromkeys(("dark", "centred", "drop_boundary"), truth_value),
 }
 # Settings that may be None: no value, or, of settings for several kinds, the default of each.
-_OPTIONAL = ("voxels", "threshold", "dark", *DEFAULTED)
+_OPTIONAL = ("voxels", "threshold", "dark", "n_centers", *DEFAULTED)
 # Filled with the default of a kind where there is one; settings for several leave it to their parts.
 _EACH_OWN: Any = None
 # What a file says about itself.
@@ -76,19 +78,22 @@ class Settings:
         Number of eigenpairs that signatures are made of.
     n_maps
         Number of projections taken from each band; of times, frequencies or energies of a signature. This,
-        `n_centers`, `power`, `scaling` and `moments` are each kind's own where they are None.
+        `power`, `scaling`, `moments` and `levels` are each kind's own where they are None.
     centred
         Whether the mean field is subtracted before the PCA.
     drop_boundary
         Whether nodes next to the boundary are left out of the code.
     n_centers
-        Number of centres of each band's vocabulary.
+        Number of centres of each band's vocabulary; None for that of the kind, and fewer where training nodes
+        are few.
     power
         Exponent α of (5.3).
     scaling
         How the intensities of the projections are made comparable: see `Normalisation`.
     moments
         1 for the residual sums of (5.2) only, 2 for second moments beside them: see `vlad`.
+    levels
+        Number of levels of the first map in which the nodes are summed apart: see `VLAD`.
     nodes_per_shape
         Number of nodes drawn from each shape for training.
     seed
@@ -117,10 +122,11 @@ class Settings:
     n_maps: int = _EACH_OWN
     centred: bool = False
     drop_boundary: bool = False
-    n_centers: int = _EACH_OWN
+    n_centers: int | None = None
     power: float = _EACH_OWN
     scaling: Scaling = _EACH_OWN
     moments: int = _EACH_OWN
+    levels: int = _EACH_OWN
     nodes_per_shape: int = 500
     seed: int = 0
     code_format: int = CODE_FORMAT
@@ -254,6 +260,7 @@ class Settings:
             "power": 0.25,
             "scaling": "deviation",
             "moments": 1,
+            "levels": 1,
         }
         return cls(**(chosen | changes))
 

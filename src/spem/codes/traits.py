@@ -11,7 +11,7 @@ from spem.errors import ParameterError
 
 # What codes of all kinds are made with, unless a kind has its own.
 _USUAL: Mapping[str, Any] = MappingProxyType(
-    {"n_maps": 8, "n_centers": 64, "power": 0.5, "scaling": "standard", "moments": 2}
+    {"n_maps": 8, "power": 0.5, "scaling": "standard", "moments": 2, "levels": 1}
 )
 
 
@@ -29,36 +29,44 @@ class Traits:
         Settings that belong to some kinds alone, this one among them.
     defaults
         Settings that codes of this kind take where none are given: see `_USUAL` for their names.
+    n_centers
+        Number of centres where none is given, and there are training nodes enough.
     """
 
     of: str
     ndims: tuple[int, ...] = ()
     own: tuple[str, ...] = ()
     defaults: Mapping[str, Any] = field(default_factory=lambda: _USUAL)
+    n_centers: int = 64
 
 
-_OF_SWEEPS = ("rho_ranges", "scheme", "n_rho", "centred", "n_maps")
+_OF_SWEEPS = ("rho_ranges", "scheme", "n_rho", "centred", "n_maps", "levels")
 _OF_SPECTRA = ("n_pairs", "n_maps")
-_CONTOUR: Mapping[str, Any] = MappingProxyType({**_USUAL, "n_maps": 64, "n_centers": 256})
-_SOURCES: Mapping[str, Any] = MappingProxyType({**_USUAL, "n_maps": 44, "n_centers": 256})
+_OF_MAPS: Mapping[str, Any] = MappingProxyType({**_USUAL, "levels": 4})
+_OF_CONTOURS: Mapping[str, Any] = MappingProxyType({**_USUAL, "n_maps": 64})
 TRAITS: Mapping[str, Traits] = MappingProxyType(
     {
-        "spem": Traits("SPEM maps", own=_OF_SWEEPS),
+        "spem": Traits("SPEM maps", own=_OF_SWEEPS, defaults=_OF_MAPS),
         "hks": Traits("heat kernel signature of the solid", own=_OF_SPECTRA),
         "si-hks": Traits("the same, invariant to scale", own=_OF_SPECTRA),
         "wks": Traits("wave kernel signature of the solid", own=_OF_SPECTRA),
         "surface-hks": Traits("heat kernel signature of the surface", (3,), _OF_SPECTRA),
         "surface-si-hks": Traits("the same, invariant to scale", (3,), _OF_SPECTRA),
         "surface-wks": Traits("wave kernel signature of the surface", (3,), _OF_SPECTRA),
-        "sources": Traits("what pieces of the contour see of each other", (2,), defaults=_SOURCES),
-        "shape-context": Traits("what each point of the contour sees", (2,), defaults=_CONTOUR),
-        "inner-distance": Traits("the same, along ways inside", (2,), defaults=_CONTOUR),
+        "sources": Traits("what pieces of the contour see of each other", (2,), defaults=_OF_CONTOURS),
+        "shape-context": Traits(
+            "what each point of the contour sees", (2,), defaults=_OF_CONTOURS, n_centers=128
+        ),
+        "inner-distance": Traits("the same, along ways inside", (2,), defaults=_OF_CONTOURS, n_centers=128),
     }
 )
-# What to take of shapes of a dimension where the kind is not named; of others there are maps alone.
-_SURFACE: Mapping[int, tuple[str, ...]] = MappingProxyType({2: ("shape-context",), 3: ("surface-wks",)})
+# What to take of shapes of a dimension where the kind is not named; of others there are maps alone. In the
+# plane the sources tell what maps tell, and more: maps beside them add nothing.
+_SURFACE: Mapping[int, tuple[str, ...]] = MappingProxyType(
+    {2: ("shape-context", "inner-distance"), 3: ("surface-wks",)}
+)
 _BEST: Mapping[int, tuple[str, ...]] = MappingProxyType(
-    {ndim: ("spem", *kinds) for ndim, kinds in _SURFACE.items()}
+    {2: ("sources", *_SURFACE[2]), 3: ("spem", *_SURFACE[3])}
 )
 AUTO, SURFACE = "auto", "surface"
 DEFAULTED = tuple(_USUAL)

@@ -17,6 +17,8 @@ from spem.codes.normalise import Normalisation, Scaling, peak_share, unit_rms
 from spem.codes.vocabulary import Vocabulary, sum_residuals
 from spem.errors import ParameterError
 
+_FEWEST_CENTERS = 8
+
 
 def vlad(
     features: NDArray[np.floating],
@@ -150,6 +152,9 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         1 for the residual sums of (5.2), 2 for their squares beside them: see `vlad`.
     levels
         Number of levels of `peak_share` that nodes are summed in, with equally many training nodes each.
+    nodes_per_center
+        Least number of training nodes for each centre: where there are fewer nodes than that, fewer centres
+        are made, but no fewer than eight. Words that a handful of nodes decide tell shapes apart badly.
     n_init
         Number of k-means++ starts for each vocabulary.
     random_state
@@ -185,6 +190,7 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         scaling: Scaling = "standard",
         moments: int = 2,
         levels: int = 1,
+        nodes_per_center: int = 1,
         n_init: int = 1,
         random_state: int | RandomState | None = None,
     ) -> None:
@@ -194,6 +200,7 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         self.scaling = scaling
         self.moments = moments
         self.levels = levels
+        self.nodes_per_center = nodes_per_center
         self.n_init = n_init
         self.random_state = random_state
 
@@ -209,7 +216,9 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
             # At unit rms over its own shape, a sample has only the affine part before it.
             nodes = ((np.concatenate(unit[band]) - normal.mean) @ normal.transform).astype(np.float32)
             seed = random.randint(np.iinfo(np.int32).max)
-            words = Vocabulary(self.n_centers, n_init=self.n_init, random_state=seed).fit(nodes)
+            words = Vocabulary(self._count_centers(len(nodes)), n_init=self.n_init, random_state=seed).fit(
+                nodes
+            )
             self.normalisations_.append(normal)
             self.vocabularies_.append(words)
             self.spreads_.append(sum_residuals(nodes, words.cluster_centers_).spreads)
@@ -238,6 +247,12 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         tags.input_tags.three_d_array = True
         return tags
 
+    def _count_centers(self, n_nodes: int) -> int:
+        """Return the number of centres that so many training nodes make."""
+        if self.nodes_per_center == 1:
+            return self.n_centers
+        return min(self.n_centers, max(_FEWEST_CENTERS, n_nodes // self.nodes_per_center), n_nodes)
+
     def _normalisation(
         self, raw: Sequence[NDArray[np.floating]], unit: Sequence[NDArray[np.floating]]
     ) -> Normalisation:
@@ -261,7 +276,7 @@ class VLAD(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  #
         if not 0 <= self.power <= 1:
             msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"
             raise ParameterError(msg)
-        for name in ("n_centers", "nodes_per_shape", "levels", "n_init"):
+        for name in ("n_centers", "nodes_per_shape", "levels", "nodes_per_center", "n_init"):
             if getattr(self, name) < 1:
                 msg = f"{name}={getattr(self, name)} must be at least 1"
                 raise ParameterError(msg)

@@ -24,7 +24,7 @@ _LAYOUT = 2
 # Length of the digest that a folder of work is named by.
 _DIGITS, _HEX = 12, set("0123456789abcdef")
 # Settings that change codes but not the features that they are made of.
-_LATER = ("n_centers", "power", "scaling", "moments", "nodes_per_shape", "seed")
+_LATER = ("n_centers", "power", "scaling", "moments", "levels", "nodes_per_shape", "seed")
 
 
 @dataclass(frozen=True)

@@ -113,6 +113,8 @@ def _plain_distances(features: Features, settings: Settings, seed: int) -> NDArr
     rng = np.random.default_rng(seed)
     maps = [bands[0] for bands in features.bands]
     drawn = [m[rng.integers(len(m), size=settings.nodes_per_shape)] for m in maps]
-    words = Vocabulary(settings.n_centers, random_state=seed).fit(np.concatenate(drawn)).cluster_centers_
+    words = (
+        Vocabulary(settings.n_centers or 64, random_state=seed).fit(np.concatenate(drawn)).cluster_centers_
+    )
     vectors = np.stack([vlad(m, words.astype(m.dtype), settings.power) for m in maps])
     return correlation_distance(vectors, vectors)
