@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from spem.fields.streamlines import Streamlines, source_streamlines
     from spem.fields.superposition.fields import SourceFields
     from spem.fields.superposition.hyperfield import SourceHyperfield
+    from spem.fields.surface_spectrum import SurfaceSpectrum, solve_surface_spectrum
     from spem.fields.walks.conditioned import arriving_walk, source_walk, transform_walk
     from spem.fields.walks.estimate import estimate_field
     from spem.fields.walks.intervals import Estimate
@@ -75,6 +76,7 @@ if TYPE_CHECKING:
     from spem.retrieval.evaluation import PrecisionRecall, Scores, bulls_eye, precision_recall
     from spem.retrieval.ranking import Answer
     from spem.shapes import creatures, synthetic
+    from spem.shapes.boundary_surface import boundary_surface
     from spem.shapes.landmarks import CreaturePoses, creature_poses
     from spem.shapes.levels import signed_distance_shape
     from spem.shapes.read import read, read_all
@@ -122,12 +124,14 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "Spectrum",
     "SpemError",
     "Streamlines",
+    "SurfaceSpectrum",
     "Sweep",
     "Transient",
     "VLAD",
     "Vocabulary",
     "Walk",
     "arriving_walk",
+    "boundary_surface",
     "bulls_eye",
     "classify",
     "cluster_interactions",
@@ -175,6 +179,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "shared_values",
     "signed_distance_shape",
     "solve_spectrum",
+    "solve_surface_spectrum",
     "solve_transient",
     "source_correlation",
     "source_distances",
@@ -234,12 +239,14 @@ _HOME = {
     "Spectrum": "spem.fields.spectrum",
     "SpemError": "spem.errors",
     "Streamlines": "spem.fields.streamlines",
+    "SurfaceSpectrum": "spem.fields.surface_spectrum",
     "Sweep": "spem.fields.solvers.sweep",
     "Transient": "spem.fields.walks.transient",
     "VLAD": "spem.codes.vlad",
     "Vocabulary": "spem.codes.vocabulary",
     "Walk": "spem.fields.walks.killed",
     "arriving_walk": "spem.fields.walks.conditioned",
+    "boundary_surface": "spem.shapes.boundary_surface",
     "bulls_eye": "spem.retrieval.evaluation",
     "classify": "spem.collections",
     "cluster_interactions": "spem.decomposition.clusters",
@@ -287,6 +294,7 @@ _HOME = {
     "shared_values": "spem.embedding.signatures",
     "signed_distance_shape": "spem.shapes.levels",
     "solve_spectrum": "spem.fields.spectrum",
+    "solve_surface_spectrum": "spem.fields.surface_spectrum",
     "solve_transient": "spem.fields.walks.transient",
     "source_correlation": "spem.decomposition.interactions",
     "source_distances": "spem.fields.geodesics",

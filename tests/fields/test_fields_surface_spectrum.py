@@ -35,7 +35,7 @@ def test_values_of_a_sphere_converge_with_second_order() -> None:
     for level in (3, 4):
         values = solve_surface_spectrum(icosphere(level), 49).values
         errors.append(np.abs(values[1:] / (degree * (degree + 1))[1:] - 1)[:24].max())
-        assert np.allclose(values, degree * (degree + 1), rtol=0.011, atol=1e-9)
+        assert np.allclose(values, degree * (degree + 1), rtol=0.015, atol=1e-9)
     assert errors[1] < errors[0] / 3.5
 
 

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import trimesh
 
+from spem.codes.sources import source_hash
 from spem.errors import ShapeError
 from spem.shapes.boundary_surface import boundary_surface
 from spem.shapes.meshes import mesh_shape
+from spem.shapes.rescale import to_voxel_budget
 from spem.shapes.shape import Shape
 
 
@@ -94,3 +96,10 @@ def test_other_dimensions_are_refused(ndim: int) -> None:
     """Only solids have boundary surfaces."""
     with pytest.raises(ShapeError, match=f"shapes of 3 dimensions, this one has {ndim}"):
         boundary_surface(Shape.from_mask(np.ones((3,) * ndim)))
+
+
+def test_surface_goes_with_its_shape(ball: trimesh.Trimesh) -> None:
+    """A resampled shape keeps its mesh, and shapes of other meshes are told apart."""
+    shape = mesh_shape(ball.vertices, ball.faces, voxels=500)
+    assert to_voxel_budget(shape, 900).surface is shape.surface
+    assert source_hash(shape) != source_hash(replace(shape, surface=None))

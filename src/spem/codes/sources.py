@@ -122,6 +122,9 @@ def source_hash(source: Source) -> str:
     digest = hashlib.sha256(f"{source.mask.shape} {source.spacing}".encode())
     for array in (source.mask, source.cuts.voxel, source.cuts.direction, source.cuts.fraction):
         digest.update(np.ascontiguousarray(array).tobytes())
+    if source.surface is not None:
+        digest.update(np.ascontiguousarray(source.surface.vertices).tobytes())
+        digest.update(np.ascontiguousarray(source.surface.faces).tobytes())
     return digest.hexdigest()
 
 

@@ -21,8 +21,8 @@ from spem.fields.spectrum import Eigenpairs, Spectrum, solve_spectrum
 from spem.shapes.shape import Shape
 
 Array = NDArray[np.float64]
-# Below the first value of most surfaces of unit area, and up to Weyl's estimate of the last. Taken by score on
-# SHREC'11, better on either half of its classes; joined with maps it makes no difference.
+# Below the first value of most surfaces of unit area, and up to Weyl's estimate of the last. Taken by score
+# on SHREC'11, better on either half of its classes; joined with maps it makes no difference.
 _SURFACE_LOWEST, _SURFACE_BEYOND = 3.0, 2.0
 
 

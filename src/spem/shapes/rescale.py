@@ -230,4 +230,4 @@ def _with_report(old: Shape, new: Shape) -> Shape:
     )
     if old.mask.ravel()[other].any():
         phrases.append("parts that were closer than a voxel may have merged")
-    return replace(new, report=new.report.with_repair(*phrases))
+    return replace(new, report=new.report.with_repair(*phrases), surface=old.surface)
