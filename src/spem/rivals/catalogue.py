@@ -48,7 +48,7 @@ RIVALS: Mapping[str, Entry] = MappingProxyType(
     {
         "SD-GDM": Entry("sd_gdm", "SDGDM", (_POTPOURRI,)),
         "iHKS": Entry("ihks", "IHKS"),
-        "MDS-CM-BOF": Entry("mds_cm_bof", "MdsCmBof", (_POTPOURRI, _OPENCV)),
+        "MDS-CM-BOF": Entry("mds_cm_bof", "MdsCmBof", (_OPENCV,)),
         "Shape-DNA": Entry("shape_dna", "ShapeDNA"),
         "Shape-DNA (solid)": Entry("shape_dna", "ShapeDNA", parameters={"solid": True}),
         "Shape-DNA (reweighted)": Entry("shape_dna", "ShapeDNA", parameters={"reweighted": True}),
