@@ -105,3 +105,17 @@ def test_scores_after_diffusion_come_apart(spem: Spem, meshes: Path, joined: Pat
     facts = json.loads(spem(*plain, "--rerank", "--json", "-").stdout)
     assert set(facts["after_diffusion"]) == {"NN", "FT", "ST", "E", "DCG", "bulls_eye"}
     assert facts["NN"] == json.loads(spem(*plain, "--json", "-").stdout)["NN"]
+
+
+def test_info_says_what_the_surface_is(spem: Spem, meshes: Path, tmp_path: Path) -> None:
+    """The mesh where it is sound, else where it was taken from; silhouettes have none."""
+    told = json.loads(spem("info", meshes / "box0.off", *QUICK[:2], "--json").stdout)["surface"]
+    assert told == "its mesh: 98 vertices, 192 faces"
+    two = trimesh.util.concatenate(
+        [trimesh.creation.icosphere(2), trimesh.creation.icosphere(2).apply_translation([0.9, 0, 0])]
+    )
+    two.export(tmp_path / "two.off")
+    told = json.loads(spem("info", tmp_path / "two.off", "--voxels", "2000", "--json").stdout)["surface"]
+    assert told.startswith("remeshed from the filled volume: 2 parts of the mesh bound it: ")
+    np.save(tmp_path / "square.npy", np.ones((9, 9)))
+    assert json.loads(spem("info", tmp_path / "square.npy", "--json").stdout)["surface"] is None

@@ -69,11 +69,11 @@ def encode(
         int | None, typer.Option(min=1, help="Eigenpairs that a signature is made of. [100]")
     ] = None,
     n_maps: Annotated[
-        int | None, typer.Option(min=1, help="Maps of each range; values of a signature. [8]")
+        int | None, typer.Option(min=1, help="Maps of each range. [8] Values of a signature. [surface: 16]")
     ] = None,
     n_centers: Annotated[
         int | None,
-        typer.Option(min=1, help="Centres of each vocabulary. [64; 128 of contours; fewer of few shapes]"),
+        typer.Option(min=1, help="Centres of each vocabulary. [64; fewer of few shapes]"),
     ] = None,
     power: Annotated[
         float | None, typer.Option(help="Exponent of the residuals, α of (5.3), 0 to 1. [0.5]")

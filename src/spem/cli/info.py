@@ -107,6 +107,7 @@ def describe(shape: Shape) -> dict[str, Any]:
         "components": report.components,
         "volume_kept": report.volume_kept,
         "repairs": list(report.repairs),
+        "surface": _surface(shape),
     }
 
 
@@ -124,6 +125,18 @@ def spacing_source(report: Report) -> str:
     resampled = [phrase for phrase in report.repairs if phrase.startswith("resampled from")]
     told = [phrase for phrase in report.method.split("; ") if "spacing" in phrase]
     return (resampled + told + ["none in the file, 1 taken"])[0]
+
+
+def _surface(shape: Shape) -> str | None:
+    """Say what the surface of a solid is in codes; nothing of other shapes."""
+    if shape.ndim != 3:
+        return None
+    from spem.shapes.boundary_surface import boundary_surface
+
+    surface = boundary_surface(shape)
+    done = [phrase for phrase in surface.repairs if phrase not in shape.report.repairs]
+    size = f"{len(surface.vertices)} vertices, {len(surface.faces)} faces"
+    return f"{'; '.join(done) or 'its mesh'}: {size}"
 
 
 def _text(value: Any) -> str:

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from spem.codes.bands import Bands, as_bands
 from spem.codes.normalise import Normalisation
 from spem.codes.settings import Settings
-from spem.codes.traits import TRAITS
 from spem.codes.vlad import VLAD, encode
 from spem.errors import ModelError, ParameterError
 
-# Sixteen silhouettes of 128 points each do not make 128 words.
+# Words of each kind where no number is asked for, and the training nodes that each has to stand for: sixteen
+# silhouettes of 128 points do not make 64 words.
+N_CENTERS = 64
 _NODES_PER_CENTER = 64
 
 
@@ -60,7 +61,7 @@ class Part:
     def fit(cls, settings: Settings, shapes: Iterable[Bands]) -> Self:
         """Learn from the features of shapes, for each a tuple of ``(n_nodes, n_values)`` a band."""
         learner = VLAD(
-            settings.n_centers or TRAITS[settings.features].n_centers,
+            settings.n_centers or N_CENTERS,
             power=settings.power,
             nodes_per_shape=settings.nodes_per_shape,
             scaling=settings.scaling,

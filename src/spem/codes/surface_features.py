@@ -16,8 +16,7 @@ from spem.shapes.surface_points import spread_points
 # Points spread over each surface. A thousand tell shapes apart as well, but codes of one surface under two
 # meshes would differ by as much as those of two poses.
 N_POINTS = 4000
-# Finer surfaces are decimated, or a solution would take seconds: values change by some percent, no more than
-# between poses of one body.
+# Finer surfaces are decimated, or a solution would take seconds; a code changes by as much as with the pose.
 MOST_VERTICES = 3000
 
 

@@ -29,35 +29,33 @@ class Traits:
         Settings that belong to some kinds alone, this one among them.
     defaults
         Settings that codes of this kind take where none are given: see `_USUAL` for their names.
-    n_centers
-        Number of centres where none is given, and there are training nodes enough.
     """
 
     of: str
     ndims: tuple[int, ...] = ()
     own: tuple[str, ...] = ()
     defaults: Mapping[str, Any] = field(default_factory=lambda: _USUAL)
-    n_centers: int = 64
 
 
 _OF_SWEEPS = ("rho_ranges", "scheme", "n_rho", "centred", "n_maps", "levels")
 _OF_SPECTRA = ("n_pairs", "n_maps")
 _OF_MAPS: Mapping[str, Any] = MappingProxyType({**_USUAL, "levels": 4})
-_OF_CONTOURS: Mapping[str, Any] = MappingProxyType({**_USUAL, "n_maps": 64})
+_FINE: Mapping[str, Any] = MappingProxyType({**_USUAL, "n_maps": 16})
+_COARSE: Mapping[str, Any] = MappingProxyType({**_USUAL, "n_maps": 6})
+# Of roots of histograms second moments tell little, for twice the length.
+_OF_CONTOURS: Mapping[str, Any] = MappingProxyType({**_USUAL, "n_maps": 64, "moments": 1})
 TRAITS: Mapping[str, Traits] = MappingProxyType(
     {
         "spem": Traits("SPEM maps", own=_OF_SWEEPS, defaults=_OF_MAPS),
         "hks": Traits("heat kernel signature of the solid", own=_OF_SPECTRA),
         "si-hks": Traits("the same, invariant to scale", own=_OF_SPECTRA),
         "wks": Traits("wave kernel signature of the solid", own=_OF_SPECTRA),
-        "surface-hks": Traits("heat kernel signature of the surface", (3,), _OF_SPECTRA),
-        "surface-si-hks": Traits("the same, invariant to scale", (3,), _OF_SPECTRA),
-        "surface-wks": Traits("wave kernel signature of the surface", (3,), _OF_SPECTRA),
+        "surface-hks": Traits("heat kernel signature of the surface", (3,), _OF_SPECTRA, _FINE),
+        "surface-si-hks": Traits("the same, invariant to scale", (3,), _OF_SPECTRA, _COARSE),
+        "surface-wks": Traits("wave kernel signature of the surface", (3,), _OF_SPECTRA, _FINE),
         "sources": Traits("what pieces of the contour see of each other", (2,), defaults=_OF_CONTOURS),
-        "shape-context": Traits(
-            "what each point of the contour sees", (2,), defaults=_OF_CONTOURS, n_centers=128
-        ),
-        "inner-distance": Traits("the same, along ways inside", (2,), defaults=_OF_CONTOURS, n_centers=128),
+        "shape-context": Traits("what each point of the contour sees", (2,), defaults=_OF_CONTOURS),
+        "inner-distance": Traits("the same, along ways inside", (2,), defaults=_OF_CONTOURS),
     }
 )
 # What to take of shapes of a dimension where the kind is not named; of others there are maps alone. In the
