@@ -6,6 +6,11 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from spem.embedding.boundary_contexts import boundary_contexts
+    from spem.embedding.boundary_response import BoundaryResponse
+    from spem.embedding.boundary_response import boundary_response
+    from spem.codes.joining import fusion_weights
+    from spem.codes.joining import join_codes
     from spem.api.fields import field, maps, sweep
     from spem.api.parts import parts, source_fields, sources
     from spem.codes.codes import Codes, Failure
@@ -87,6 +92,7 @@ __version__ = "0.1.0"
 __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three lists
     "Answer",
     "BlockLanczos",
+    "BoundaryResponse",
     "Classification",
     "Clusters",
     "Codes",
@@ -131,6 +137,8 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "Vocabulary",
     "Walk",
     "arriving_walk",
+    "boundary_contexts",
+    "boundary_response",
     "boundary_surface",
     "bulls_eye",
     "classify",
@@ -147,6 +155,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "evaluate",
     "field",
     "fuse",
+    "fusion_weights",
     "heat_kernel",
     "heat_kernel_signature",
     "hu_moments",
@@ -154,6 +163,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "inner_distances",
     "iso_contours",
     "iso_surfaces",
+    "join_codes",
     "joint_parts",
     "killed_walk",
     "level_curvature",
@@ -202,6 +212,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
 _HOME = {
     "Answer": "spem.retrieval.ranking",
     "BlockLanczos": "spem.fields.solvers.lanczos",
+    "BoundaryResponse": "spem.embedding.boundary_response",
     "Classification": "spem.retrieval.classification",
     "Clusters": "spem.decomposition.clusters",
     "Codes": "spem.codes.codes",
@@ -246,6 +257,8 @@ _HOME = {
     "Vocabulary": "spem.codes.vocabulary",
     "Walk": "spem.fields.walks.killed",
     "arriving_walk": "spem.fields.walks.conditioned",
+    "boundary_contexts": "spem.embedding.boundary_contexts",
+    "boundary_response": "spem.embedding.boundary_response",
     "boundary_surface": "spem.shapes.boundary_surface",
     "bulls_eye": "spem.retrieval.evaluation",
     "classify": "spem.collections",
@@ -262,6 +275,7 @@ _HOME = {
     "evaluate": "spem.collections",
     "field": "spem.api.fields",
     "fuse": "spem.retrieval.distances",
+    "fusion_weights": "spem.codes.joining",
     "heat_kernel": "spem.embedding.heat",
     "heat_kernel_signature": "spem.embedding.signatures",
     "hu_moments": "spem.codes.moments",
@@ -269,6 +283,7 @@ _HOME = {
     "inner_distances": "spem.fields.geodesics",
     "iso_contours": "spem.fields.isocontours",
     "iso_surfaces": "spem.fields.isocontours",
+    "join_codes": "spem.codes.joining",
     "joint_parts": "spem.decomposition.joint",
     "killed_walk": "spem.fields.walks.killed",
     "level_curvature": "spem.fields.level_curves",

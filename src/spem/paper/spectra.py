@@ -147,7 +147,7 @@ def kind_settings(kind: Kind, count: int, *, voxels: int, n_pairs: int, n_center
     >>> kind_settings("wks", 4, voxels=900, n_pairs=50).n_pairs
     50
     """
-    settings = Settings(features="spem", n_maps=count, voxels=voxels, n_centers=n_centers)
+    settings = Settings(features="spem", n_maps=count, voxels=voxels, n_centers=n_centers, levels=1)
     return settings if kind == "spem" else replace(settings, features=kind, n_pairs=n_pairs)
 
 
