@@ -61,7 +61,7 @@ def test_choices_are_those_of_the_library(choice: type[StrEnum], kind: object) -
 def test_defaults_of_codes_are_shown(spem: Callable[..., Result]) -> None:
     """The help of `encode` has the defaults and choices of the settings."""
     text, default = " ".join(spem("encode", "--help").stdout.split()), Settings(features="spem")
-    for name in ("n_maps", "power", "moments", "scaling", "levels"):
+    for name in ("n_maps", "power", "moments", "scaling"):
         assert f"[{getattr(default, name)}]" in text.split(f"--{name.replace('_', '-')} ")[1][:140]
     assert ", ".join(get_args(Scaling)[:-1]) in text
 

@@ -152,7 +152,7 @@ def test_joined_model_adds_the_distances_of_its_parts():
     parts = [np.stack([each.encode(bands[i]) for bands in shapes(1)]) for i, each in enumerate(alone)]
     expected = sum(w * correlation_distance(p, p) for w, p in zip(model.weights, parts, strict=True))
     np.testing.assert_allclose(correlation_distance(joined, joined), expected, atol=1e-6)
-    assert model.n_code == joined.shape[1] == 96 + 24
+    assert model.n_code == joined.shape[1] == 48
     assert sum(model.weights) == pytest.approx(1)
 
 

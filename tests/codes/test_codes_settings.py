@@ -103,6 +103,7 @@ def test_parts_of_joined_features():
     )
     assert joined.resolved(3) == Settings(features="spem+surface-wks", n_centers=32, n_pairs=50, n_rho=20)
     assert Settings().resolved(4) == Settings(features="spem")
+    assert (spem.levels, Settings(features="spem").levels, Settings(levels=3).parts(3)[0].levels) == (1, 4, 3)
     with pytest.raises(
         ParameterError, match=r"'surface' are of 2-D or 3-D shapes, not of 4-D ones; take .*'spem'"
     ):

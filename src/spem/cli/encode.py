@@ -89,7 +89,7 @@ def encode(
         int | None, typer.Option(help="Moments of the residuals in a code, 1 or 2. [2]")
     ] = None,
     levels: Annotated[
-        int | None, typer.Option(min=1, help="Levels of the first map that are summed apart. [4]")
+        int | None, typer.Option(min=1, help="Levels of the first map that are summed apart. [4; joined: 1]")
     ] = None,
     drop_boundary: Annotated[
         bool | None, typer.Option("--drop-boundary/--keep-boundary", help="Leave out nodes at the boundary.")

@@ -93,7 +93,8 @@ class Settings:
     moments
         1 for the residual sums of (5.2) only, 2 for second moments beside them: see `vlad`.
     levels
-        Number of levels of the first map in which the nodes are summed apart: see `VLAD`.
+        Number of levels of the first map in which the nodes are summed apart: see `VLAD`. Of maps four where it
+        is None, but one beside other kinds, which make up for what levels gain.
     nodes_per_shape
         Number of nodes drawn from each shape for training.
     seed
@@ -189,7 +190,9 @@ class Settings:
         >>> [part.features for part in Settings(n_centers=32).parts(3)]
         ['spem', 'surface-wks']
         """
-        return tuple(self._of_kind(kind) for kind in kinds_of(self.features, ndim))
+        kinds = kinds_of(self.features, ndim)
+        alone = self if len(kinds) == 1 or self.levels is not None else replace(self, levels=1)
+        return tuple(alone._of_kind(kind) for kind in kinds)
 
     def resolved(self, ndim: int | None) -> Self:
         """Return the same settings with the kinds by name that the features stand for.
