@@ -93,8 +93,8 @@ class Settings:
     moments
         1 for the residual sums of (5.2) only, 2 for second moments beside them: see `vlad`.
     levels
-        Number of levels of the first map in which the nodes are summed apart: see `VLAD`. Of maps four where it
-        is None, but one beside other kinds, which make up for what levels gain.
+        Number of levels of the first map in which the nodes are summed apart: see `VLAD`. Where it is None
+        maps have four, but one beside other kinds, which make up for what levels gain.
     nodes_per_shape
         Number of nodes drawn from each shape for training.
     seed
