@@ -24,7 +24,7 @@ from spem.codes.bands import Bands
 from spem.codes.kinds import shape_features
 from spem.codes.model import Model
 from spem.codes.settings import Settings
-from spem.errors import ParameterError
+from spem.errors import MissingExtraError, ParameterError
 from spem.paper.data import Data
 from spem.paper.scoring import compute_all, features_of
 from spem.retrieval.classification import classify_vectors, linear_svm
@@ -32,7 +32,6 @@ from spem.retrieval.diffusion import rerank
 from spem.retrieval.distances import correlation_distance
 from spem.retrieval.evaluation import evaluate
 from spem.rivals.elliptic_fourier import EllipticFourier
-from spem.rivals.extra import MissingExtraError
 from spem.rivals.hu import Hu
 from spem.rivals.protocol import Rival
 from spem.rivals.zernike import Zernike

@@ -7,6 +7,7 @@
     ├── ParameterError      an argument out of its range (also a ValueError)
     ├── LabelError          labels that do not fit the shapes they label
     ├── ModelError          codes, a vocabulary or a query that do not belong together
+    ├── MissingExtraError   a package of an extra that is not installed
     └── ConvergenceError    an iteration that missed its tolerance; carries the best iterate
 
 Each message is one line: what is wrong, where, what was expected, what to do.
@@ -71,6 +72,10 @@ class LabelError(SpemError):
 
 class ModelError(SpemError):
     """Codes, a vocabulary or a query that were not made by the same model."""
+
+
+class MissingExtraError(SpemError):
+    """A package that only an extra needs, and that is not installed."""
 
 
 class ConvergenceError(SpemError):

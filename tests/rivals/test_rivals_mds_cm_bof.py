@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spem.errors import ShapeError
+from spem.errors import MissingExtraError, ShapeError
 from spem.retrieval.evaluation import evaluate
 from spem.rivals.depth_views import depth_views
-from spem.rivals.extra import MissingExtraError
 from spem.rivals.mds_cm_bof import (
     MdsCmBof,
     ViewFeatures,

@@ -8,10 +8,9 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from spem.errors import ParameterError, ShapeError
+from spem.errors import MissingExtraError, ParameterError, ShapeError
 from spem.retrieval.evaluation import evaluate
 from spem.rivals.elliptic_fourier import EllipticFourier
-from spem.rivals.extra import MissingExtraError
 from spem.rivals.hu import Hu
 from spem.rivals.plane import euclidean_distances
 from spem.rivals.zernike import Zernike

@@ -6,13 +6,9 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-from spem.errors import SpemError
+from spem.errors import MissingExtraError
 
 EXTRA = "spem[rivals]"
-
-
-class MissingExtraError(SpemError):
-    """A package of the extra is not installed."""
 
 
 def require(module: str, distribution: str) -> Any:
@@ -37,7 +33,7 @@ def require(module: str, distribution: str) -> Any:
     >>> require("no_such_module", "no-such-package")
     Traceback (most recent call last):
         ...
-    spem.rivals.extra.MissingExtraError: needs no-such-package; install spem[rivals]
+    spem.errors.MissingExtraError: needs no-such-package; install spem[rivals]
     """
     if not has(module):
         msg = f"needs {distribution}; install {EXTRA}"
@@ -46,11 +42,11 @@ def require(module: str, distribution: str) -> Any:
 
 
 def has(module: str) -> bool:
-    """Tell whether a module is installed, without importing it.
+    """Tell whether the package of a module is installed, without importing it.
 
     Examples
     --------
-    >>> has("json"), has("no_such_module")
+    >>> has("json"), has("no_such_package.module")
     (True, False)
     """
-    return find_spec(module) is not None
+    return find_spec(module.partition(".")[0]) is not None
