@@ -110,6 +110,15 @@ def test_parts_of_joined_features():
         joined.parts(4)
 
 
+@pytest.mark.parametrize(("features", "ndim"), [("auto", 2), ("surface", 2), ("surface", 3)])
+def test_settings_of_kinds_that_a_shape_does_not_get_are_refused(features, ndim):
+    """A setting of maps says nothing of contours and surfaces, once it is known that these are meant."""
+    made = Settings(features=features, rho_ranges=((0.1, 0.2),))
+    for resolve in (made.parts, made.resolved):
+        with pytest.raises(ParameterError, match="rho_ranges: a setting of features 'spem', not of"):
+            resolve(ndim)
+
+
 def test_settings_of_files_from_before_a_setting_stand_at_its_default():
     """Files that know nothing of kinds hold SPEM maps; one that lacks an older setting is refused."""
     values = Settings(features="spem", n_maps=4).to_json()

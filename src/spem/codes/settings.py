@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from importlib.metadata import version
@@ -11,7 +11,7 @@ from typing import Any, Literal, Self, get_args
 
 from spem.codes.arguments import finite_number, truth_value, whole_number
 from spem.codes.normalise import Scaling
-from spem.codes.traits import AUTO, DEFAULTED, TRAITS, check_features, kinds_of
+from spem.codes.traits import AUTO, BESIDE, DEFAULTED, TRAITS, check_features, kinds_of
 from spem.errors import ModelError, ParameterError
 from spem.fields.operator import Boundary
 from spem.fields.rho import DEFAULT_COUNT, DEFAULT_RANGE, Scheme
@@ -153,24 +153,29 @@ class Settings:
         if not 0 <= (self.power or 0.0) <= 1:
             msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"
             raise ParameterError(msg)
-        self._check_kinds()
+        words = self.features.split("+")
+        if set(words) <= set(TRAITS):
+            self._check_kinds(words)
         n_maps = self.n_maps or TRAITS["spem"].defaults["n_maps"]
-        if {"spem", AUTO} & set(self.features.split("+")) and n_maps > self.n_rho:
+        if {"spem", AUTO} & set(words) and n_maps > self.n_rho:
             msg = f"n_maps={n_maps} must be at most n_rho={self.n_rho}, the number of ρ in each range"
             raise ParameterError(msg)
 
-    def _check_kinds(self) -> None:
+    def _check_kinds(self, chosen: Sequence[str]) -> None:
         """Refuse settings that have no meaning for these kinds of features."""
-        words = self.features.split("+")
-        if not set(words) <= set(TRAITS):
-            return
         for entry in fields(self):
             kinds = [kind for kind, traits in TRAITS.items() if entry.name in traits.own]
-            usual = (entry.default, *(TRAITS[word].defaults.get(entry.name) for word in words))
-            if kinds and not set(kinds) & set(words) and getattr(self, entry.name) not in usual:
-                of = " or ".join(map(repr, kinds))
-                msg = f"{entry.name}: a setting of features {of}, not of {self.features!r}; leave it out"
+            usual = (entry.default, *(TRAITS[kind].defaults.get(entry.name) for kind in chosen))
+            if kinds and not set(kinds) & set(chosen) and getattr(self, entry.name) not in usual:
+                of, these = " or ".join(map(repr, kinds)), "+".join(chosen)
+                msg = f"{entry.name}: a setting of features {of}, not of {these!r}; leave it out"
                 raise ParameterError(msg)
+
+    def _kinds(self, ndim: int | None) -> tuple[str, ...]:
+        """Return the kinds that the features stand for, where all settings have a meaning for them."""
+        kinds = kinds_of(self.features, ndim)
+        self._check_kinds(kinds)
+        return kinds
 
     def parts(self, ndim: int | None = None) -> tuple[Self, ...]:
         """Return settings for each kind of features alone, with the defaults of that kind.
@@ -183,26 +188,32 @@ class Settings:
         Raises
         ------
         ParameterError
-            When shapes of this dimension have no such features.
+            When shapes of this dimension have no such features, or a setting is of others.
 
         Examples
         --------
         >>> [part.features for part in Settings(n_centers=32).parts(3)]
         ['spem', 'surface-wks']
         """
-        kinds = kinds_of(self.features, ndim)
-        alone = self if len(kinds) == 1 or self.levels is not None else replace(self, levels=1)
+        kinds = self._kinds(ndim)
+        beside = {name: value for name, value in BESIDE.items() if getattr(self, name) is None}
+        alone = replace(self, **beside) if len(kinds) > 1 else self
         return tuple(alone._of_kind(kind) for kind in kinds)
 
     def resolved(self, ndim: int | None) -> Self:
         """Return the same settings with the kinds by name that the features stand for.
+
+        Raises
+        ------
+        ParameterError
+            As `parts` does.
 
         Examples
         --------
         >>> Settings().resolved(3).features
         'spem+surface-wks'
         """
-        kinds = kinds_of(self.features, ndim)
+        kinds = self._kinds(ndim)
         return self._of_kind(*kinds) if len(kinds) == 1 else replace(self, features="+".join(kinds))
 
     def _of_kind(self, kind: str) -> Self:
@@ -286,7 +297,7 @@ class Settings:
         ------
         ModelError
             When they were written for another method, or name a setting that is not known here. Settings that
-            are newer than the file stand at their defaults.
+            are newer than the file stand at what was done before there were such.
         """
         found = values.get("code_format")
         if found != CODE_FORMAT:

@@ -66,6 +66,8 @@ _SURFACE: Mapping[int, tuple[str, ...]] = MappingProxyType(
 _BEST: Mapping[int, tuple[str, ...]] = MappingProxyType(
     {2: ("sources", *_SURFACE[2]), 3: ("spem", *_SURFACE[3])}
 )
+# Defaults of kinds beside others, which make up for what levels gain.
+BESIDE: Mapping[str, Any] = MappingProxyType({"levels": 1})
 AUTO, SURFACE = "auto", "surface"
 DEFAULTED = tuple(_USUAL)
 
