@@ -56,6 +56,15 @@ def test_holes_are_boundary_of_no_arc() -> None:
     assert np.abs(band.mean(axis=0) - filled.mean(axis=0)).max() > 0.02
 
 
+def test_a_sieve_has_features() -> None:
+    """With more holes than arcs the outer contour still has arcs of its own."""
+    mask = np.ones((102, 102), bool)
+    mask[3::8, 3::8] = False
+    (band,) = source_features(Shape.from_mask(mask), SETTINGS)
+    assert len(band) / 2 > N_PATCHES / 2
+    assert np.isfinite(band).all()
+
+
 @pytest.mark.parametrize("mask", [np.ones((1, 1)), np.ones((1, 2)), np.ones((2, 2)), np.ones((1, 300))])
 def test_the_smallest_shapes_have_features(mask: np.ndarray) -> None:
     """A single pixel, two, four and a line have finite features."""

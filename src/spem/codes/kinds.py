@@ -34,8 +34,8 @@ def shape_features(shape: Shape, settings: Settings, threads: int | None = None)
     -------
     tuple
         For each band ``(n_nodes, n_maps)`` in float32, kind after kind; those of one kind are over the same
-        nodes, pixels or voxels (all, or those off the boundary), vertices of the surface, or points of the
-        contour.
+        nodes, pixels or voxels (all, or those off the boundary), points of the surface, or points or arcs of
+        the contour.
 
     Raises
     ------

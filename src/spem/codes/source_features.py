@@ -46,7 +46,8 @@ def source_features(
     threads
         Without effect: one shape takes milliseconds.
     n_patches
-        Number of arcs that the contours are cut into, fewer where there are fewer boundary points.
+        Number of arcs that the contours are cut into, fewer where there are fewer boundary points; beside one
+        for each contour where there are more contours than that.
     rho
         Screening length, in units of the shape's size.
     mirrored
@@ -75,7 +76,9 @@ def source_features(
         msg = f"{shape.name}: features 'sources' are of silhouettes; this shape has {shape.ndim} dimensions"
         raise ShapeError(msg)
     points = point_sources(assemble(shape, settings.boundary))
-    count = min(max(n_patches, points.points.n_contours), points.n_sources)
+    n_contours = points.points.n_contours
+    # each contour takes an arc: with more of them than arcs nothing would be left to divide the longest
+    count = min(n_patches if n_contours < n_patches else n_contours + n_patches, points.n_sources)
     arcs = divide_points(points, count)
     outer = arcs.select(np.flatnonzero(arcs.contour == 0))
     shares = boundary_contexts(boundary_response(outer, rho * shape.size))

@@ -20,7 +20,7 @@ N_POINTS = 4000
 MOST_VERTICES = 3000
 
 
-def surface_features(shape: Shape, settings: Settings, _: int | None = None) -> Bands:
+def surface_features(shape: Shape, settings: Settings, threads: int | None = None) -> Bands:
     """Compute the signature that the settings name at points spread evenly over the surface of a solid.
 
     Parameters
@@ -29,6 +29,8 @@ def surface_features(shape: Shape, settings: Settings, _: int | None = None) -> 
         A shape of three dimensions; its surface is that of `boundary_surface`, decimated where it is fine.
     settings
         Kind ``"surface-hks"``, ``"surface-si-hks"`` or ``"surface-wks"``, number of pairs and of features.
+    threads
+        Without effect: the solution is of one thread.
 
     Returns
     -------
@@ -38,7 +40,7 @@ def surface_features(shape: Shape, settings: Settings, _: int | None = None) -> 
     Raises
     ------
     ShapeError
-        When the shape has no surface.
+        When the shape is not of three dimensions, or its surface has no area.
     ConvergenceError
         When the eigenvalue iteration stops short.
 

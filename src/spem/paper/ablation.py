@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spem.codes.part import N_CENTERS
 from spem.codes.settings import Settings
 from spem.codes.vlad import vlad
 from spem.codes.vocabulary import Vocabulary
@@ -113,8 +114,7 @@ def _plain_distances(features: Features, settings: Settings, seed: int) -> NDArr
     rng = np.random.default_rng(seed)
     maps = [bands[0] for bands in features.bands]
     drawn = [m[rng.integers(len(m), size=settings.nodes_per_shape)] for m in maps]
-    words = (
-        Vocabulary(settings.n_centers or 64, random_state=seed).fit(np.concatenate(drawn)).cluster_centers_
-    )
+    count = settings.n_centers or N_CENTERS
+    words = Vocabulary(count, random_state=seed).fit(np.concatenate(drawn)).cluster_centers_
     vectors = np.stack([vlad(m, words.astype(m.dtype), settings.power) for m in maps])
     return correlation_distance(vectors, vectors)
