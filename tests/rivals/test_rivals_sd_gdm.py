@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from spem.errors import ShapeError
-from spem.rivals.sd_gdm import SDGDM, geodesic_matrix, largest_values, vertex_areas
+from spem.rivals.sd_gdm import SDGDM, geodesic_matrix, largest_values
 from spem.shapes.read import read
 from spem.shapes.shape import Shape
 from spem.shapes.surface import Surface
@@ -88,12 +88,6 @@ def test_a_silhouette_is_refused():
     """It has no surface, and the message names it."""
     with pytest.raises(ShapeError, match=r"disk.*surface is of shapes of 3 dimensions"):
         SDGDM().describe(disk(3.0, 1.0))
-
-
-def test_areas_of_vertices_are_thirds_of_faces():
-    """A tetrahedron's vertices share its area."""
-    surface = sphere(0)
-    assert vertex_areas(surface) == pytest.approx(np.full(12, surface.area / 12))
 
 
 @pytest.mark.data

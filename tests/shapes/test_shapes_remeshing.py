@@ -37,6 +37,12 @@ def test_decimation_keeps_a_sphere(sphere: Surface) -> None:
     assert decimate(sphere, 642) is sphere
 
 
+def test_surface_without_faces_is_not_cut() -> None:
+    """Points alone never become more."""
+    with pytest.raises(ShapeError, match="3 vertices has no faces to cut"):
+        subdivide(Surface(np.eye(3), np.empty((0, 3), np.int64)), 10)
+
+
 def test_too_few_vertices_are_refused(sphere: Surface) -> None:
     """No closed surface has three vertices."""
     with pytest.raises(ParameterError, match="n_vertices=3: expected at least 4"):

@@ -29,6 +29,14 @@ def test_volume_and_area_are_those_of_a_box() -> None:
     assert surface.closed
 
 
+def test_areas_of_vertices_are_thirds_of_faces() -> None:
+    """The vertices of an icosahedron share its area, that of its faces together."""
+    mesh = trimesh.creation.icosahedron()
+    surface = Surface(np.array(mesh.vertices), np.array(mesh.faces, np.int64))
+    assert surface.vertex_areas == pytest.approx(np.full(12, surface.area / 12))
+    assert surface.face_areas == pytest.approx(mesh.area_faces)
+
+
 def test_holes_are_counted_by_edges_and_loops(ball: Surface) -> None:
     """Two missing faces far apart are six open edges in two loops."""
     faces = np.delete(ball.faces, [0, 200], axis=0)

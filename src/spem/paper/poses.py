@@ -21,6 +21,7 @@ from spem.shapes.distance import signed_distance
 from spem.shapes.landmarks import creature_poses
 from spem.shapes.read import read
 from spem.shapes.shape import Shape
+from spem.shapes.surface import Surface
 
 # Collection: what it holds, file at rest, the other files.
 _MESHES = {
@@ -214,7 +215,7 @@ def _mesh_poses(
     meshes = [trimesh.load(file, process=False) for file in files]
     vertices = [np.asarray(mesh.vertices, np.float64) for mesh in meshes]
     faces = np.asarray(meshes[0].faces)
-    area = _vertex_areas(vertices[0], faces)
+    area = Surface(vertices[0], faces).vertex_areas
     side = rng.choice(len(area), n_marks // 2, replace=False, p=area / area.sum())
     chosen = np.concatenate([side, _mirror_images(vertices[0])[side]])
     half = np.arange(n_marks // 2)
@@ -264,13 +265,6 @@ def _creature(quick: bool, n_points: int, n_marks: int, rng: np.random.Generator
         made.points[:, pairs],
         np.concatenate([np.arange(half) + half, np.arange(half)]),
     )
-
-
-def _vertex_areas(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Area that each vertex stands for: a third of its triangles."""
-    corner = vertices[faces]
-    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 6
-    return np.bincount(faces.ravel(), np.repeat(area, 3), len(vertices)).astype(np.float64)
 
 
 def _mirror_images(vertices: NDArray[np.float64]) -> NDArray[np.int64]:

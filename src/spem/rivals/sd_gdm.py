@@ -150,15 +150,7 @@ def geodesic_matrix(surface: Surface, samples: int, name: str = "surface") -> tu
     if not np.isfinite(distances).all():
         msg = f"{name}: distances over the surface are not finite; mend its thin or double triangles"
         raise ShapeError(msg)
-    return (distances + distances.T) / 2, np.bincount(owner, vertex_areas(surface), n).astype(np.float64)
-
-
-def vertex_areas(surface: Surface) -> Array:
-    """Return ``(n_vertices,)`` a third of the area of the faces at each vertex."""
-    a, b, c = surface.triangles.transpose(1, 0, 2)
-    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    total = np.bincount(surface.faces.ravel(), np.repeat(areas / 3, 3), len(surface.vertices))
-    return np.asarray(total, np.float64)
+    return (distances + distances.T) / 2, np.bincount(owner, surface.vertex_areas, n).astype(np.float64)
 
 
 def largest_values(matrix: Array, count: int) -> Array:

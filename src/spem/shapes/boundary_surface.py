@@ -18,7 +18,7 @@ from spem.shapes.surface import Surface, count_of
 
 # Holes whose flat fillings have more than this share of the area change what the surface is.
 _HOLE_SHARE = 0.02
-# A part of a mesh is the kept solid's when at least this share of its vertices lies beside kept voxels.
+# A part of a mesh is the kept solid's when at least this share of its faces begins beside kept voxels.
 _BESIDE_SHARE = 0.5
 # No voxel changes side and no vertex falls onto a node: least distance of a node, in the smallest spacing.
 _LEAST = 0.02
@@ -101,11 +101,10 @@ def _kept_part(shape: Shape, mesh: Surface) -> tuple[Surface, str]:
     beside = ((index >= 0) & (index <= last)).all(axis=1) & near[tuple(np.clip(index, 0, last).T)]
     share = np.bincount(part, beside, volume.size) / np.bincount(part, minlength=volume.size)
     solids = np.flatnonzero((share >= _BESIDE_SHARE) & (volume > 0))
-    if solids.size != 1:
-        return (
-            mesh,
-            f"{count_of(solids.size, 'part')} of the mesh bound it" if solids.size else "no part does",
-        )
+    if not solids.size:
+        return mesh, "no part of the mesh bounds it"
+    if solids.size > 1:
+        return mesh, f"{solids.size} parts of the mesh bound it"
     return _only(mesh, part, int(solids[0]), volume.size), ""
 
 

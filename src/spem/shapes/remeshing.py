@@ -6,8 +6,8 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import ParameterError
-from spem.shapes.surface import Surface, count_of
+from spem.errors import ParameterError, ShapeError
+from spem.shapes.surface import Surface
 
 
 def subdivide(surface: Surface, n_vertices: int) -> Surface:
@@ -25,6 +25,11 @@ def subdivide(surface: Surface, n_vertices: int) -> Surface:
     Surface
         With what was done in `repairs`.
 
+    Raises
+    ------
+    ShapeError
+        When there is no face to cut.
+
     Examples
     --------
     >>> corners = np.array([[0.0, 0, 0], [3, 0, 0], [0, 3, 0], [0, 0, 3]])
@@ -33,14 +38,18 @@ def subdivide(surface: Surface, n_vertices: int) -> Surface:
     >>> len(finer.vertices), finer.area == tetrahedron.area, finer.repairs
     (34, True, ('cut each face into 16: 4 vertices are fewer than 30',))
     """
+    before = len(surface.vertices)
+    if before >= n_vertices:
+        return surface
+    if not len(surface.faces):
+        msg = f"a surface of {before} vertices has no faces to cut; check the mesh"
+        raise ShapeError(msg)
     fine = surface
     while len(fine.vertices) < n_vertices:
         fine = _quartered(fine)
-    if fine is surface:
-        return surface
-    each, few = len(fine.faces) // len(surface.faces), count_of(len(surface.vertices), "vertices")
-    few = few.removesuffix("s")
-    return fine.with_faces(fine.faces, f"cut each face into {each}: {few} are fewer than {n_vertices}")
+    each = len(fine.faces) // len(surface.faces)
+    phrase = f"cut each face into {each}: {before} vertices are fewer than {n_vertices}"
+    return fine.with_faces(fine.faces, phrase)
 
 
 def decimate(surface: Surface, n_vertices: int) -> Surface:
@@ -78,7 +87,7 @@ def decimate(surface: Surface, n_vertices: int) -> Surface:
     before = len(surface.vertices)
     if before <= n_vertices:
         return surface
-    # a closed surface of genus g has 2 (n - 2 + 2g) faces: as many as leave each loss of two faces a vertex
+    # with each vertex of a closed surface two faces go
     most = len(surface.faces) - 2 * (before - n_vertices)
     vertices = np.asfortranarray(surface.vertices, np.float64)
     found = igl.decimate(vertices, np.asfortranarray(surface.faces, np.int64), most, False)

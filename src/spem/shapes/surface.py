@@ -88,10 +88,21 @@ class Surface:
         return float(self.face_volumes.sum())
 
     @cached_property
+    def face_areas(self) -> NDArray[np.float64]:
+        """``(n_faces,)`` area of each face."""
+        a, b, c = self.triangles.transpose(1, 0, 2)
+        return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+
+    @cached_property
+    def vertex_areas(self) -> NDArray[np.float64]:
+        """``(n_vertices,)`` a third of the area of the faces at each vertex."""
+        thirds = np.repeat(self.face_areas / 3, 3)
+        return np.asarray(np.bincount(self.faces.ravel(), thirds, len(self.vertices)), np.float64)
+
+    @cached_property
     def area(self) -> float:
         """Area of all faces."""
-        a, b, c = self.triangles.transpose(1, 0, 2)
-        return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+        return float(self.face_areas.sum())
 
     @property
     def flat(self) -> bool:

@@ -67,8 +67,7 @@ def spread_points(surface: Surface, count: int) -> SurfacePoints:
     if count < 1:
         msg = f"count={count}: expected at least 1 point"
         raise ParameterError(msg)
-    a, b, c = surface.triangles.transpose(1, 0, 2)
-    reach = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    reach = np.cumsum(surface.face_areas)
     if not reach[-1] > 0:
         msg = "the surface has no area; no points can be spread over it"
         raise ShapeError(msg)
