@@ -82,6 +82,7 @@ def test_weights_are_equal_where_distances_do_not_differ(codes):
         ([np.ones(2), np.ones(2)], [1.0, -1.0], "expected 2 numbers of at least 0"),
         ([np.ones(2), np.ones(2)], [0.0, 0.0], "not all 0"),
         ([np.ones(2), np.ones(2)], [np.nan, 1.0], "expected 2 numbers"),
+        ([np.arange(2.0), [np.nan, 1.0]], None, "codes of kind 1 contain NaN or inf"),
     ],
 )
 def test_codes_that_do_not_go_together_are_refused(codes, weights, message):
@@ -90,7 +91,16 @@ def test_codes_that_do_not_go_together_are_refused(codes, weights, message):
         join_codes(codes, weights)
 
 
-def test_no_codes_have_no_weights():
-    """There is nothing to weigh."""
-    with pytest.raises(ParameterError, match="no codes to weigh; give those of each kind"):
-        fusion_weights([])
+@pytest.mark.parametrize(
+    ("codes", "message"),
+    [
+        ([], "no codes to weigh; give those of each kind"),
+        ([np.eye(3), np.eye(2)], r"codes to weigh have shapes \(3, 3\), \(2, 2\); give \(n_shapes, n_code\)"),
+        ([np.ones(3), np.ones(3)], r"codes to weigh have shapes \(3,\), \(3,\); give"),
+        ([np.full((3, 3), np.inf), np.eye(3)], "codes of kind 0 contain NaN or inf"),
+    ],
+)
+def test_codes_that_cannot_be_weighed_are_refused(codes, message):
+    """One clear line each."""
+    with pytest.raises(ParameterError, match=message):
+        fusion_weights(codes)

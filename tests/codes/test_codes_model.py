@@ -170,6 +170,25 @@ def test_joined_model_survives_its_file(tmp_path):
         Model.load(tmp_path / "m.spem")
 
 
+@pytest.mark.parametrize(
+    ("weights", "message"),
+    [
+        ([np.nan, 0.5], r"weights=\(nan, 0.5\): expected 2 numbers of at least 0"),
+        ([-1.0, 2.0], "expected 2 numbers of at least 0"),
+        ([0.0, 0.0], "not all 0"),
+        (["a", "b"], "m.spem: the weights are no row of numbers; make it again"),
+        (0.5, "no row of numbers"),
+    ],
+)
+def test_weights_that_weigh_nothing_are_refused(weights, message, tmp_path):
+    """A whole file whose weights are no shares is refused when it is read, not when it is used."""
+    model = Model.fit(JOINED, shapes(), ndim=2)
+    arrays = model.to_arrays() | {"weights": np.array(weights)}
+    write_container(tmp_path / "m.spem", "model", model.to_header(), arrays)
+    with pytest.raises(ModelError, match=message):
+        Model.load(tmp_path / "m.spem")
+
+
 def test_joined_model_knows_what_it_is_made_of():
     """A generator will do to learn it, its kinds are named, and features of one kind alone are refused."""
     model = Model.fit(JOINED, iter(shapes()), ndim=2)

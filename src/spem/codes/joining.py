@@ -36,7 +36,7 @@ def join_codes(codes: Sequence[ArrayLike], weights: ArrayLike | None = None) -> 
     Raises
     ------
     ParameterError
-        When there is none, they differ in their shapes, or weights do not fit.
+        When there is none, they differ in their shapes or are not finite, or weights do not fit.
 
     Examples
     --------
@@ -48,6 +48,7 @@ def join_codes(codes: Sequence[ArrayLike], weights: ArrayLike | None = None) -> 
         found = ", ".join(str(array.shape) for array in arrays) or "none"
         msg = f"codes to join have shapes {found}; give (n_code,) or (n_shapes, n_code) of the same shapes"
         raise ParameterError(msg)
+    _require_finite(arrays)
     shares = _shares(weights, len(arrays))
     together = zip(shares, arrays, strict=True)
     return np.concatenate([np.sqrt(share) * _standardised(array) for share, array in together], axis=-1)
@@ -72,7 +73,7 @@ def fusion_weights(codes: Sequence[ArrayLike]) -> NDArray[np.float64]:
     Raises
     ------
     ParameterError
-        When there is none.
+        When there is none, they are not of the same number of shapes, or not finite.
 
     Examples
     --------
@@ -83,10 +84,24 @@ def fusion_weights(codes: Sequence[ArrayLike]) -> NDArray[np.float64]:
     if not len(codes):
         msg = "no codes to weigh; give those of each kind"
         raise ParameterError(msg)
-    spreads = np.array([_spread(np.asarray(kind, np.float64)) for kind in codes])
+    arrays = [np.asarray(kind, np.float64) for kind in codes]
+    if any(array.ndim != 2 or len(array) != len(arrays[0]) for array in arrays):
+        found = ", ".join(str(array.shape) for array in arrays)
+        msg = f"codes to weigh have shapes {found}; give (n_shapes, n_code) of the same shapes for each kind"
+        raise ParameterError(msg)
+    _require_finite(arrays)
+    spreads = np.array([_spread(array) for array in arrays])
     if not (spreads > 0).all():
         return np.full(len(spreads), 1 / len(spreads))
     return np.asarray((1 / spreads) / (1 / spreads).sum())
+
+
+def _require_finite(codes: Sequence[NDArray[np.float64]]) -> None:
+    """Refuse codes that are not finite: they would pass for constant ones."""
+    for kind, array in enumerate(codes):
+        if not np.isfinite(array).all():
+            msg = f"codes of kind {kind} contain NaN or inf; they must be finite"
+            raise ParameterError(msg)
 
 
 def _spread(codes: NDArray[np.float64]) -> float:

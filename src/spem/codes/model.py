@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -52,6 +53,11 @@ class Model:
             msg = f"a model of {self.settings.features} got parts {found} and {len(self.weights)} weights"
             raise ModelError(msg)
         object.__setattr__(self, "weights", tuple(map(float, self.weights)))
+        if not all(map(math.isfinite, self.weights)) or min(self.weights) < 0 or not sum(self.weights) > 0:
+            msg = (
+                f"weights={self.weights}: expected {len(kinds)} numbers of at least 0, one a kind, not all 0"
+            )
+            raise ModelError(msg)
         if self.ndim is not None:
             object.__setattr__(self, "ndim", whole_number("ndim", self.ndim))
 
@@ -184,7 +190,7 @@ class Model:
                 Part.from_arrays(each, arrays, prefix, where.start)
                 for each, where in zip(chosen, _slices(chosen), strict=True)
             )
-            weights = (1.0,) if len(parts) == 1 else tuple(arrays[f"{prefix}weights"].tolist())
+            weights = (1.0,) if len(parts) == 1 else _weights(arrays[f"{prefix}weights"], source)
             return cls(checked, parts, weights, header.get("ndim"))
         except KeyError as error:
             msg = f"{source}: the model lacks the array {error}; make it again"
@@ -224,6 +230,14 @@ class Model:
             f"{self.parts[0].n_centers} centres, {self.parts[0].n_values} maps, codes of length {self.n_code}"
         )
         return f"Model({self.digest}, {bands}, {size})"
+
+
+def _weights(array: NDArray[Any], source: str) -> tuple[float, ...]:
+    """Read the weights of the parts, which `Model` checks further."""
+    if array.dtype.kind != "f" or array.ndim != 1:
+        msg = f"{source}: the weights are no row of numbers; make it again"
+        raise ModelError(msg)
+    return tuple(array.tolist())
 
 
 def _slices(parts: Sequence[Settings]) -> list[slice]:

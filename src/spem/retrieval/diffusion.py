@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve
 
+from spem.codes.arguments import whole_number
 from spem.errors import ParameterError
 from spem.retrieval.distances import min_max
 
@@ -81,7 +82,8 @@ def _checked(distances: ArrayLike, n_neighbours: int, weight: float) -> NDArray[
         row = np.flatnonzero(~np.isfinite(given).all(axis=1))[0]
         msg = f"distances hold nan or infinity, first in row {row}"
         raise ParameterError(msg)
-    if not 1 <= n_neighbours < len(given):
+    n_neighbours = whole_number("n_neighbours", n_neighbours)
+    if n_neighbours >= len(given):
         msg = f"n_neighbours {n_neighbours}, expected 1 to {len(given) - 1} for {len(given)} shapes"
         raise ParameterError(msg)
     if not 0 < weight < 1:
