@@ -113,3 +113,13 @@ def test_poses_are_nearer_than_classes(data_dir: Path) -> None:
     rival = IHKS(samples=200, n_words=10)
     distances = rival.compare([rival.describe(spem.read(folder / file, voxels=500)) for file in files])
     assert distances[0, 1] < min(distances[0, 2], distances[1, 2])
+
+
+def test_times_at_which_all_heat_is_even_count_for_nothing() -> None:
+    """Of balls the longest times are the same everywhere: they are left as they are."""
+    rival = IHKS(n_words=2)
+    even = np.ones((4, 1), np.float32)
+    first, second = (np.hstack([values[:, None].astype(np.float32), even]) for values in np.eye(4)[:2])
+    distances = rival.compare([first, first, second])
+    assert np.isfinite(distances).all()
+    np.testing.assert_array_equal(distances[0, 1], 0)

@@ -153,13 +153,20 @@ class IHKS:
                 f"n_words={self.n_words}: expected at most {len(points)}, the number of points of all shapes"
             )
             raise ParameterError(msg)
-        spread = np.maximum(points.std(axis=0), np.finfo(float).tiny) if self.standardised else 1.0
+        spread = _deviations(points) if self.standardised else 1.0
         rng = np.random.default_rng(_SEED)
         training = points[rng.permutation(len(points))[:_TRAINING]] / spread
         words = KMeans(self.n_words, n_init=1, random_state=_SEED).fit(training).cluster_centers_
         width = self.softness * float(np.median(cdist(training, words).min(axis=1)))
         shares = np.stack([_shares(each / spread, words, width) for each in descriptions])
         return np.asarray(cdist(shares, shares, "cityblock"))
+
+
+def _deviations(points: Array) -> Array:
+    """Return standard deviations to divide by: 1 of what is constant to the rounding of float32."""
+    found = points.std(axis=0)
+    varied = found > np.finfo(np.float32).eps * np.abs(points.mean(axis=0))
+    return np.asarray(np.where(varied, found, 1.0))
 
 
 def _shares(points: Array, words: Array, width: float) -> Array:
