@@ -17,8 +17,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from _class_halves import Array, error_of_classes, first_tier
 from _table import Benchmark, Row, data_root
 from spem.codes.kinds import shape_features
 from spem.codes.settings import Settings
@@ -35,8 +35,7 @@ SEEDS, N_PAIRS, N_ENERGIES, N_GAUSSIANS = 5, 100, 100, 32
 QUICK_CLASSES, QUICK_EACH = 4, 5
 JOINED, DNA, PEER = "SPEM+surface", "Shape-DNA (reweighted)", "spectralbrain"
 # Vertices of each shape that the Gaussians are fitted to: as many as nodes of ours.
-SAMPLE, RESAMPLES = 500, 2000
-Array = NDArray[np.float64]
+SAMPLE = 500
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -67,7 +66,11 @@ def main(argv: list[str] | None = None) -> None:
         times[PEER] += float(np.mean([seconds for _, seconds in runs]))
     title = f"shrec11: {len(found.labels)} shapes, {len(set(found.labels))} classes"
     benchmark.table(title, [row(name, each, times[name]) for name, each in scored.items()])
-    rows = [paired(scored[JOINED], scored[name]) | {"against": name} for name in scored if name != JOINED]
+    labels = np.array(found.labels)
+    tiers = {name: first_tier(each.matrices, labels) for name, each in scored.items()}
+    rows = [
+        paired(tiers[JOINED] - tiers[name], labels) | {"against": name} for name in tiers if name != JOINED
+    ]
     benchmark.table("first tier of the joined code less that of the rival, paired", rows)
     if not benchmark.quick:
         for each in rows:
@@ -121,15 +124,9 @@ def row(name: str, scored: Repeated, seconds: float) -> Row:
     return {"system": name} | scored.mean | spread | {"s a shape": seconds}
 
 
-def paired(one: Repeated, other: Repeated) -> Row:
-    """Return the mean difference of first tiers, and its standard error by resampling classes."""
-    first, second = (
-        np.mean([[each["FT"] for each in scores.per_class().values()] for scores in system.scores], axis=0)
-        for system in (one, other)
-    )
-    difference = first - second
-    draws = np.random.default_rng(0).choice(difference, (RESAMPLES, difference.size)).mean(axis=1)
-    return {"difference": float(difference.mean()), "standard error": float(draws.std())}
+def paired(difference: Array, labels: Array) -> Row:
+    """Return the mean difference of first tiers of queries, and its standard error by resampling classes."""
+    return {"difference": float(difference.mean()), "standard error": error_of_classes(difference, labels)}
 
 
 if __name__ == "__main__":

@@ -37,7 +37,7 @@ def make(data: Data) -> Finding:
     absent = data.absent("shrec11") if not found.real else "A reduced size; run it in full."
     order = [*PUBLISHED, *(name for name in found.rows if name not in PUBLISHED)]
     rows = {name: found.rows[name] for name in order}
-    claims = [spem_claim(measure, found, judgeable, absent) for measure in MEASURES]
+    claims = [spem_claim(name, found, judgeable, absent) for name in MEASURES]
     claims += [joined_claim(found, judgeable, absent), gain_claim(found, judgeable, absent)]
     if found.real:
         claims.append(outside_claim(found, judgeable, absent))

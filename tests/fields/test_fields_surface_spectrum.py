@@ -53,9 +53,9 @@ def test_rectangle_lets_nothing_through_its_border() -> None:
 
 
 def test_vectors_are_orthonormal_over_the_surface(sphere: SurfaceSpectrum) -> None:
-    """The mean square of each eigenvector over the sphere is one over its area."""
-    square = np.square(sphere.vectors).mean(axis=0)
-    assert np.allclose(square, 1 / (4 * np.pi), rtol=0.1)
+    """Integrals of products of eigenvectors are one and zero, to what the sum over vertices leaves out."""
+    products = sphere.vectors.T @ (sphere.surface.vertex_areas[:, None] * sphere.vectors)
+    assert np.allclose(products, np.eye(36), atol=0.05)
     assert (sphere.ndim, sphere.n_pairs) == (2, 36)
 
 

@@ -17,7 +17,6 @@ from spem.rivals.mds_cm_bof import (
     learn_words,
     mirror,
     nearest_words,
-    simplify,
     view_features,
 )
 from spem.rivals.view_sphere import geodesic_sphere
@@ -80,17 +79,6 @@ def test_words_are_no_more_than_features() -> None:
     words = learn_words([descriptors, descriptors[:2]], 1500, 0)
     assert len(words) <= 5
     assert nearest_words(descriptors, words).max() < len(words)
-
-
-def test_surfaces_are_simplified_only_when_large() -> None:
-    """A surface within the limit is left alone; another comes near to it and stays closed."""
-    surface = tube(0.8).surface
-    assert surface is not None
-    assert simplify(surface, 10_000) is surface
-    small = simplify(surface, 100)
-    assert 90 <= len(small.vertices) <= 110
-    assert small.closed
-    assert small.volume == pytest.approx(surface.volume, rel=0.1)
 
 
 def test_a_silhouette_has_no_views() -> None:

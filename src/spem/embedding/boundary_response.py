@@ -43,9 +43,10 @@ class BoundaryResponse:
     def distances(self) -> Array:
         """``(n_sources, n_sources)`` lengths of ways: −ρ log of fluxes between like sources.
 
-        Fluxes are divided by the measures of both sources. What is left of a source's own strength, where
-        the boundary bends, is half the mean of its logarithms and is taken off; the least length of a source
-        to itself is zero. Infinite where no way leads; without screening, ρ = `inf`, they are plain −log.
+        Fluxes are divided by the measures of both sources. Half the mean of a source's logarithms is taken
+        off: half of its own strength, which is left where the boundary bends, and no more, since the whole
+        mean would take off how far it lies from the others too. The least length of a source to itself is
+        zero. Infinite where no way leads; without screening, ρ = `inf`, they are plain −log.
         """
         measure = np.log(self.sources.measure)
         log = self.log - measure[:, None] - measure

@@ -45,7 +45,7 @@ def geodesic_disk(
     """Find the vertices within a geodesic radius of a vertex, and their distances.
 
     Fronts cross a face as circles about a virtual source (Novotni and Klein, "Computing geodesic distances on
-    triangular meshes", WSCG 2002): exact on a plane.
+    triangular meshes", WSCG 2002): exact on a plane, but too long where they come to an obtuse corner.
 
     Parameters
     ----------

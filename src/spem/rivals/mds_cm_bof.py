@@ -15,8 +15,8 @@ from spem.rivals.depth_views import depth_views, upright
 from spem.rivals.extra import require
 from spem.rivals.view_sphere import geodesic_sphere
 from spem.shapes.boundary_surface import boundary_surface
+from spem.shapes.remeshing import decimate
 from spem.shapes.shape import Shape
-from spem.shapes.surface import Surface
 
 # Rows and columns of the cells of a SIFT descriptor, and directions in each.
 _CELLS = (4, 4, 8)
@@ -66,7 +66,7 @@ class MdsCmBof:
     side
         Pixels along each side of a view.
     max_vertices
-        Surfaces of more vertices are simplified to nearly as many.
+        Surfaces of more vertices are decimated to as many.
     seed
         Of the vocabulary.
 
@@ -105,7 +105,7 @@ class MdsCmBof:
         ShapeError
             When the shape has no surface, or SIFT finds nothing in its views.
         """
-        form = canonical_form(simplify(boundary_surface(shape), self.max_vertices))
+        form = canonical_form(decimate(boundary_surface(shape), self.max_vertices))
         found = view_features(depth_views(upright(form), geodesic_sphere(), self.side))
         if not len(found.descriptors):
             msg = f"{shape.name}: no features in its views of {self.side} pixels a side; use larger views"
@@ -131,29 +131,6 @@ class MdsCmBof:
             count_words(nearest_words(mirror(each.descriptors), words), each.starts) for each in descriptions
         ]
         return clock_distances(plain, other, len(words))
-
-
-def simplify(surface: Surface, max_vertices: int) -> Surface:
-    """Return a closed surface with nearly `max_vertices` vertices in place of more, by edge collapses.
-
-    Examples
-    --------
-    >>> from skimage.measure import marching_cubes
-    >>> grid = np.linalg.norm(np.indices((15, 15, 15)) - 7.0, axis=0)
-    >>> vertices, faces, _, _ = marching_cubes(grid, 5.5)
-    >>> ball = Surface(vertices.astype(float), faces.astype(np.int64))
-    >>> len(ball.vertices), len(simplify(ball, 100).vertices)
-    (582, 100)
-    """
-    if len(surface.vertices) <= max_vertices:
-        return surface
-    import igl
-
-    # A closed surface has some twice as many faces as vertices.
-    points = np.asfortranarray(surface.vertices)
-    faces = np.asfortranarray(surface.faces, np.int32)
-    vertices, simplified, _, _ = igl.qslim(points, faces, 2 * max_vertices - 4)
-    return Surface(np.ascontiguousarray(vertices), np.ascontiguousarray(simplified), surface.repairs)
 
 
 def view_features(views: NDArray[np.uint8]) -> ViewFeatures:
