@@ -20,7 +20,8 @@ from spem.codes.part import Part
 from spem.codes.settings import Settings
 from spem.errors import ModelError, ParameterError
 
-# Training shapes whose distances tell the weights of the parts; more move them by less than a percent.
+# Training shapes whose distances tell the weights of the parts: in random order, more of them move these by
+# less than a percent.
 _WEIGHING_SHAPES = 200
 
 

@@ -182,7 +182,8 @@ def _histograms(
             if i == j or not np.isfinite(distance[i, j]):
                 continue
             reached += 1
-            x, y = position[target[i, j]] - position[i]
+            aim = target[i, j]
+            x, y = position[aim, 0] - position[i, 0], position[aim, 1] - position[i, 1]
             angle = np.arctan2(axes[i, 0] * y - axes[i, 1] * x, axes[i, 0] * x + axes[i, 1] * y)
             far = np.log(max(distance[i, j], _NEAREST) / _NEAREST) * per_radius - 0.5
             turn, far = angle * per_turn, min(max(far, 0.0), n_radii - 1.0)
