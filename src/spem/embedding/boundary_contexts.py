@@ -93,6 +93,18 @@ def departure_angles(response: BoundaryResponse) -> Array:
     ------
     ShapeError, ParameterError
         As `boundary_contexts` does.
+
+    Examples
+    --------
+    Across a disk the way leaves at a right angle:
+
+    >>> from spem.embedding.boundary_response import boundary_response
+    >>> from spem.fields.boundary.patches import patch_sources
+    >>> from spem.fields.operator import assemble
+    >>> from spem.shapes.synthetic import disk
+    >>> arcs = patch_sources(assemble(disk(1.0, 0.02)), 60)
+    >>> round(float(departure_angles(boundary_response(arcs, 0.1))[0, 30] / np.pi), 1)
+    0.5
     """
     _check(response, DEFAULT_BINS)
     distance, measure = response.distances, response.sources.measure

@@ -101,6 +101,13 @@ def response_of(fields: SourceFields) -> BoundaryResponse:
     ------
     ParameterError
         If they are no fields of sources, or not of every boundary that their system has a source for.
+
+    Examples
+    --------
+    >>> import spem
+    >>> sources = spem.sources(spem.synthetic.interval(1.0, 0.01))
+    >>> response_of(solve_sources(sources, 0.2))
+    BoundaryResponse('interval', 2 x 2 sources, rho 0.2)
     """
     require_fields(fields)
     sources = fields.sources

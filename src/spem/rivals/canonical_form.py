@@ -149,6 +149,15 @@ def canonical_form(surface: Surface, *, tolerance: float = 1e-4, max_iterations:
     -------
     Surface
         The same faces; vertices up to a rotation, a reflection and a shift.
+
+    Examples
+    --------
+    Two faces folded along an edge come out flat, their far corners two heights apart:
+
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> flat = canonical_form(Surface(corners, np.array([[0, 1, 2], [0, 3, 1]]))).vertices
+    >>> round(float(np.linalg.norm(flat[2] - flat[3])), 3)
+    2.0
     """
     distances = surface_distances(surface)
     start = classical_scaling(distances)

@@ -66,6 +66,13 @@ def depth_views(surface: Surface, directions: NDArray[np.float64], side: int = 2
     numpy.ndarray
         ``(n_views, side, side)``: 0 where the line of sight meets nothing, else from 1 at the farthest point
         of the ball to 255 at the nearest.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0.5], [0.5, 0, 0.5], [0, 0.5, 0.5]])
+    >>> (image,) = depth_views(Surface(corners, np.array([[0, 1, 2]])), np.array([[0.0, 0, 1]]), 8)
+    >>> image.shape, np.unique(image)
+    ((8, 8), array([  0, 192], dtype=uint8))
     """
     images = np.zeros((len(directions), side, side), np.float32)
     half = side / 2

@@ -185,6 +185,11 @@ def learn_words(descriptors: Sequence[NDArray[np.uint8]], n_words: int, seed: in
     -------
     numpy.ndarray
         ``(n_words, 128)`` centres.
+
+    Examples
+    --------
+    >>> learn_words([np.zeros((3, 128), np.uint8), np.full((2, 128), 9, np.uint8)], 5, 0).shape
+    (2, 128)
     """
     from sklearn.cluster import MiniBatchKMeans
 

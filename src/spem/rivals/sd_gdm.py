@@ -154,7 +154,13 @@ def geodesic_matrix(surface: Surface, samples: int, name: str = "surface") -> tu
 
 
 def largest_values(matrix: Array, count: int) -> Array:
-    """Return the largest singular values of a symmetric matrix, largest first."""
+    """Return the largest singular values of a symmetric matrix, largest first.
+
+    Examples
+    --------
+    >>> largest_values(np.diag([1.0, -3.0, 2.0]), 2)
+    array([3., 2.])
+    """
     if len(matrix) <= max(_DENSE, 4 * count):
         found = np.abs(eigvalsh(matrix))
     else:
