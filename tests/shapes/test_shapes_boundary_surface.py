@@ -73,6 +73,19 @@ def test_hollow_is_left_out(ball: trimesh.Trimesh) -> None:
     assert np.isclose(surface.area, ball.area)
 
 
+def test_solids_that_touch_at_a_corner_are_two() -> None:
+    """The surface is that of the cube that was kept; with both kept it is taken from the grid."""
+    small = trimesh.creation.box((1, 1, 1)).apply_translation([1.5, 1.5, 1.5])
+    both = trimesh.util.concatenate([trimesh.creation.box((2, 2, 2)), small])
+    both.merge_vertices()
+    assert len(both.vertices) == 15
+    kept = boundary_surface(mesh_shape(both.vertices, both.faces, voxels=500))
+    assert kept.volume == pytest.approx(8)
+    assert kept.repairs == ("left 1 of 2 parts of the surface out",)
+    whole = boundary_surface(mesh_shape(both.vertices, both.faces, voxels=500, components="all"))
+    assert "2 parts of the mesh bound it" in whole.repairs[0]
+
+
 def test_overlapping_parts_are_remeshed(ball: trimesh.Trimesh) -> None:
     """Two balls that overlap have one surface, that of their union."""
     both = trimesh.util.concatenate([ball, ball.copy().apply_translation([1, 0, 0])])

@@ -110,9 +110,7 @@ def _kept_part(shape: Shape, mesh: Surface) -> tuple[Surface, str]:
 
 def _flaw(surface: Surface) -> str:
     """Say what keeps a mesh from being a surface with small holes; nothing where all is well."""
-    start, stop = surface.faces.reshape(-1), np.roll(surface.faces, -1, axis=1).reshape(-1)
-    key = np.minimum(start, stop) * len(surface.vertices) + np.maximum(start, stop)
-    crowded = int(np.count_nonzero(np.unique(key, return_counts=True)[1] > 2))
+    crowded = int(np.count_nonzero(np.unique(_edge_keys(surface), return_counts=True)[1] > 2))
     if crowded:
         return f"{count_of(crowded, 'edge')} with more than two faces"
     share = _hole_area(surface) / surface.area
@@ -135,14 +133,20 @@ def _hole_area(surface: Surface) -> float:
 
 
 def _parts(surface: Surface) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Return the part of each face, parts being joined by vertices, and the signed volume of each part."""
-    one, two, three = surface.faces.T
-    n = len(surface.vertices)
-    links = (np.concatenate([one, two]), np.concatenate([two, three]))
-    graph = coo_array((np.ones(links[0].size, bool), links), shape=(n, n))
+    """Return the part of each face, parts being joined by edges, and the signed volume of each part."""
+    n = len(surface.faces)
+    _, edge = np.unique(_edge_keys(surface), return_inverse=True)
+    links = (np.arange(3 * n) // 3, n + edge)
+    graph = coo_array((np.ones(3 * n, bool), links), shape=(n + 3 * n,) * 2)
     _, label = connected_components(graph, directed=False)
-    used, part = np.unique(label[one], return_inverse=True)
+    used, part = np.unique(label[:n], return_inverse=True)
     return part.astype(np.int64), np.bincount(part, surface.face_volumes, used.size)
+
+
+def _edge_keys(surface: Surface) -> NDArray[np.int64]:
+    """Return ``(3 n_faces,)`` a number for each edge of each face, the same for both directions."""
+    start, stop = surface.faces.reshape(-1), np.roll(surface.faces, -1, axis=1).reshape(-1)
+    return np.asarray(np.minimum(start, stop) * len(surface.vertices) + np.maximum(start, stop))
 
 
 def _only(surface: Surface, part: NDArray[np.int64], kept: int, count: int) -> Surface:
