@@ -122,8 +122,10 @@ def test_numbers_of_pairs_are_checked(n_pairs: float) -> None:
 
 
 def test_surfaces_without_a_spectrum_are_refused(sphere: SurfaceSpectrum) -> None:
-    """No area, lone vertices and too few pairs are told apart."""
+    """No surface at all, no area and lone vertices are told apart."""
     plain = icosphere(1)
+    with pytest.raises(ParameterError, match="expected Surface, got tuple; take"):
+        solve_surface_spectrum((plain.vertices, plain.faces), 3)  # type: ignore[arg-type]
     with pytest.raises(ShapeError, match="no area"):
         solve_surface_spectrum(Surface(0 * plain.vertices, plain.faces), 3)
     with pytest.raises(ShapeError, match="1 of 43 vertices have no face"):

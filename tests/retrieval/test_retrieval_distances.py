@@ -80,5 +80,7 @@ def test_bad_vectors_are_refused():
         correlation_distance(np.ones(3), np.ones((1, 3)))
     with pytest.raises(ParameterError, match="one shape, not"):
         fuse(np.ones((2, 2)), np.ones((3, 3)))
+    with pytest.raises(ParameterError, match=r"not \(2, 3, 3\); give each by itself"):
+        fuse([np.ones((3, 3)), np.ones((3, 3))])
     with pytest.raises(ParameterError, match="must be finite"):
         min_max([np.inf, 1.0])

@@ -75,6 +75,14 @@ def test_inner_distances_under_a_voxel_are_refused(distance):
         to_inner_distance(synthetic.disk(20, 1), distance)
 
 
+def test_a_shape_that_meets_its_budget_stays_as_it_is():
+    """Nothing is sampled twice; unequal steps are made equal all the same."""
+    made = to_voxel_budget(ball(15.2, 36, 2), 3000)
+    assert to_voxel_budget(made, 3010) is made
+    uneven = Shape.from_mask(np.ones((30, 20)), (1.0, 2.0))
+    assert to_voxel_budget(uneven, 600).spacing == pytest.approx((2**0.5, 2**0.5), rel=0.05)
+
+
 def test_a_missed_budget_is_told():
     """Rows of a square come and go together: the nearest grid is kept, and the report has its count."""
     made = to_voxel_budget(Shape.from_mask(np.ones((9, 9))), 7)

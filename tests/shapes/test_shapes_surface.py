@@ -157,3 +157,9 @@ def test_surfaces_given_are_not_changed(ball: Surface) -> None:
     before = faces.copy()
     mend(Surface(ball.vertices, faces))
     assert np.array_equal(faces, before)
+
+
+def test_surfaces_print_in_one_line(ball: Surface) -> None:
+    """Numbers of vertices and faces, and what was repaired, but no coordinates."""
+    told = repr(ball.with_faces(ball.faces[1:], "one face left out"))
+    assert told == f"Surface({len(ball.vertices)} vertices, {len(ball.faces) - 1} faces, one face left out)"

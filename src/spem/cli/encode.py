@@ -354,7 +354,8 @@ def _tell(output: Path, codes: Codes, failures: tuple[Failure, ...], *, json: bo
     """Tell what was written, and what failed in this run."""
     if not json:
         failed = f", {len(failures)} failed" if failures else ""
-        typer.echo(f"wrote {output}: {counted(len(codes), 'shape')}{failed}, model {codes.model.digest}")
+        model = f"features {codes.model.settings.features}, model {codes.model.digest}"
+        typer.echo(f"wrote {output}: {counted(len(codes), 'shape')}{failed}, {model}")
         return
     facts = {"output": output, "n_shapes": len(codes), "n_failed": len(failures)}
     facts |= {"model": codes.model.digest, "settings": codes.model.settings.to_json()}

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import glob
 import hashlib
+import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -93,9 +94,25 @@ def count_hidden(paths: Iterable[str | Path]) -> int:
     return sum(_hidden(path, folder) for folder in folders for path in _shapes_below(folder))
 
 
-def as_source(source: str | Path | Shape) -> Source:
-    """Return a path or a shape."""
-    return source if isinstance(source, Shape) else Path(source)
+def as_source(source: Any) -> Source:
+    """Return a path or a shape.
+
+    Raises
+    ------
+    ParameterError
+        When it is neither.
+
+    Examples
+    --------
+    >>> as_source("hand.png").suffix
+    '.png'
+    """
+    if isinstance(source, Shape):
+        return source
+    if not isinstance(source, (str, os.PathLike)):
+        msg = f"expected files or shapes, got {type(source).__name__}; read it first: spem.read(...)"
+        raise ParameterError(msg)
+    return Path(source)
 
 
 def source_path(source: Source) -> str:

@@ -12,7 +12,7 @@ import scipy.sparse
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
-from spem.errors import ConvergenceError, ParameterError, ShapeError
+from spem.errors import ConvergenceError, ParameterError, ShapeError, require_kind
 from spem.fields.solvers.blas import one_thread
 from spem.fields.spectrum import eigenvector_signs
 from spem.shapes.remeshing import subdivide
@@ -107,7 +107,7 @@ def solve_surface_spectrum(surface: Surface, n_pairs: int = 100, *, name: str = 
     Raises
     ------
     ParameterError
-        When the number of pairs is not a whole number of at least 1.
+        When this is no surface, or the number of pairs not a whole number of at least 1.
     ShapeError
         When the surface has no area, values that are not finite, or vertices without a face.
     ConvergenceError
@@ -149,6 +149,7 @@ def _check_pairs(n_pairs: Any, name: str) -> None:
 
 def _check_surface(surface: Surface, name: str) -> None:
     """Refuse surfaces that have no spectrum."""
+    require_kind(surface, Surface, "take spem.boundary_surface(shape)")
     if not len(surface.faces) or not np.isfinite(surface.vertices).all() or not surface.area > 0:
         msg = f"{name}: the surface has no faces, no area or vertices that are not finite; check the mesh"
         raise ShapeError(msg)

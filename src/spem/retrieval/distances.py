@@ -84,12 +84,12 @@ def fuse(*distances: ArrayLike) -> NDArray[np.float64]:
     Parameters
     ----------
     *distances
-        Matrices of one shape, one from each method.
+        Matrices of one shape, one from each method, each an argument of its own.
 
     Raises
     ------
     ParameterError
-        If there is none, or their shapes differ.
+        If there is none, one is no matrix or not finite, or their shapes differ.
 
     Examples
     --------
@@ -98,8 +98,9 @@ def fuse(*distances: ArrayLike) -> NDArray[np.float64]:
     """
     matrices = [np.asarray(d, float) for d in distances]
     shapes = sorted({m.shape for m in matrices})
-    if len(shapes) != 1:
-        msg = f"fusion needs one or more matrices of one shape, not {shapes}"
+    if len(shapes) != 1 or len(shapes[0]) != 2:
+        found = ", ".join(map(str, shapes)) or "none"
+        msg = f"fusion needs one or more matrices of one shape, not {found}; give each by itself: fuse(a, b)"
         raise ParameterError(msg)
     return np.asarray(np.sum([min_max(m) for m in matrices], axis=0))
 

@@ -67,7 +67,7 @@ def to_voxel_budget(shape: Shape, voxels: int, *, memory_limit: int | None = Non
     Parameters
     ----------
     shape
-        The shape.
+        The shape; one that is isotropic and has that many is returned as it is.
     voxels
         Nodes wanted; met within 1 % where whole voxels allow it, else the report says how many
         there are.
@@ -87,6 +87,9 @@ def to_voxel_budget(shape: Shape, voxels: int, *, memory_limit: int | None = Non
     9988
     """
     wanted = voxel_count(voxels, shape.name)
+    isotropic = np.allclose(shape.spacing, shape.spacing[0], rtol=1e-12)
+    if isotropic and abs(shape.n_nodes - wanted) <= _TOLERANCE * wanted:
+        return shape
     resampler = _Resampler.of(shape, memory_limit)
     return fit_spacing(
         resampler.isotropic,

@@ -43,6 +43,11 @@ class Surface:
     faces: NDArray[np.int64]
     repairs: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """Give the number of vertices and faces, and what was repaired."""
+        done = "; ".join(self.repairs)
+        return f"Surface({len(self.vertices)} vertices, {len(self.faces)} faces{', ' * bool(done)}{done})"
+
     @cached_property
     def open_edges(self) -> NDArray[np.int64]:
         """``(n_open, 2)`` edges not used as often in one direction as in the other."""
