@@ -52,3 +52,11 @@ def test_an_exponent_for_which_the_sum_diverges_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"p=1.5: expected more than 1.5 in 3 dimensions"):
         WESD(p=1.5).describe(ball(1.0, 0.3))
     assert WESD(p=1.5, n_values=3).describe(box((1.0, 1.0), 0.2)).shape == (3,)
+
+
+def test_fine_solids_are_resampled():
+    """A ball of many voxels has the spectrum of one of few: the surface lies between them."""
+    fine, coarse = ball(1.0, 0.06), ball(1.0, 0.12)
+    assert fine.n_nodes > 5000 > coarse.n_nodes
+    found = [WESD(n_values=10).describe(shape) for shape in (fine, coarse)]
+    np.testing.assert_allclose(found[0], found[1], rtol=0.01)

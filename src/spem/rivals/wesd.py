@@ -11,13 +11,10 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from spem.errors import ParameterError
-from spem.fields.solvers.lanczos import BlockLanczos
-from spem.fields.spectrum import solve_spectrum
+from spem.rivals.solid_spectrum import VOXELS, dirichlet_values
 from spem.shapes.shape import Shape
 
 Array = NDArray[np.float64]
-# Values are right to the square of this.
-_RTOL = 1e-3
 
 
 @dataclass(frozen=True)
@@ -32,7 +29,7 @@ class WESD:
     Deviations: the spectrum is solved on the voxels of the shape with the surface where it cuts them, second
     order in the spacing, in place of the staircase of a label map.
 
-    Time: 1 s a solid of 15,000 voxels on one core.
+    Time: 0.35 s a solid of 5,000 voxels on one core.
 
     Parameters
     ----------
@@ -41,6 +38,8 @@ class WESD:
     n_values
         Number of values. From 20 to 50 of them, and from p = 1.5 to 3, first tiers on SHREC'11 are the same
         within half a point.
+    voxels
+        A solid of more voxels is resampled to about as many.
 
     Examples
     --------
@@ -53,6 +52,7 @@ class WESD:
 
     p: float = 2.0
     n_values: int = 50
+    voxels: int = VOXELS
 
     @property
     def name(self) -> str:
@@ -81,9 +81,7 @@ class WESD:
             least = shape.ndim / 2
             msg = f"{shape.name}: p={self.p!r}: expected more than {least:g} in {shape.ndim} dimensions"
             raise ParameterError(msg)
-        solver = BlockLanczos(rtol=_RTOL)
-        spectrum = solve_spectrum(shape, self.n_values, boundary="absorbing", solver=solver)
-        return 1 / (spectrum.values * shape.size**2)
+        return 1 / dirichlet_values(shape, self.n_values, self.voxels)
 
     def compare(self, descriptions: Sequence[Any]) -> Array:
         """Compute the weighted spectral distances, ``(n_shapes, n_shapes)``."""
