@@ -201,6 +201,15 @@ def test_joined_model_knows_what_it_is_made_of():
         model.encode((np.ones((5, 3)), np.ones((9, 2))), "cat")
 
 
+@pytest.mark.parametrize(
+    ("bands", "found"), [(np.ones((50, 3)), "one array"), ((np.ones((50, 3)),) * 3, "3 bands")]
+)
+def test_joined_model_is_not_learnt_of_other_bands(bands, found):
+    """Two kinds need a tuple of two bands a shape."""
+    with pytest.raises(ParameterError, match=f"a training shape has {found}; give a tuple of 2"):
+        Model.fit(JOINED, [bands], ndim=2)
+
+
 def test_settings_that_leave_the_kind_open_are_resolved():
     """A model names the kinds that "auto" stood for, so that it is the same tomorrow."""
     model = Model.fit(Settings(n_maps=3, n_centers=4), [bands[:1] for bands in shapes()], ndim=4)

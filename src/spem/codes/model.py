@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.codes.arguments import whole_number
+from spem.codes.bands import Bands
 from spem.codes.container import content_hash, read_container, write_container
 from spem.codes.joining import fusion_weights, join_codes
 from spem.codes.part import Part
@@ -88,9 +89,10 @@ class Model:
         if len(chosen) == 1:
             return cls(resolved, (Part.fit(chosen[0], shapes),), ndim=ndim)
         again = list(shapes) if isinstance(shapes, Iterator) else shapes
+        slices = _slices(chosen)
         parts = tuple(
-            Part.fit(each, (bands[where] for bands in again))
-            for each, where in zip(chosen, _slices(chosen), strict=True)
+            Part.fit(each, (_bands(bands, slices[-1].stop)[where] for bands in again))
+            for each, where in zip(chosen, slices, strict=True)
         )
         unweighted = cls(resolved, parts, (1.0,) * len(parts), ndim)
         codes = [unweighted.codes(bands) for bands in islice(again, _WEIGHING_SHAPES)]
@@ -239,6 +241,15 @@ def _weights(array: NDArray[Any], source: str) -> tuple[float, ...]:
         msg = f"{source}: the weights are no row of numbers; make it again"
         raise ModelError(msg)
     return tuple(array.tolist())
+
+
+def _bands(bands: Any, count: int) -> Bands:
+    """Refuse features of other kinds, since the rows of one array would pass for bands."""
+    if not isinstance(bands, tuple) or len(bands) != count:
+        found = f"{len(bands)} bands" if isinstance(bands, tuple) else "one array"
+        msg = f"a training shape has {found}; give a tuple of {count}, those of each kind in turn"
+        raise ParameterError(msg)
+    return bands
 
 
 def _slices(parts: Sequence[Settings]) -> list[slice]:
