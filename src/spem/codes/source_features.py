@@ -77,8 +77,8 @@ def source_features(
         raise ShapeError(msg)
     points = point_sources(assemble(shape, settings.boundary))
     n_contours = points.points.n_contours
-    # each contour takes an arc: with more of them than arcs nothing would be left to divide the longest
-    count = min(n_patches if n_contours < n_patches else n_contours + n_patches, points.n_sources)
+    # each contour takes an arc: where holes took half of them little would be left to divide the longest
+    count = min(n_patches if 2 * n_contours <= n_patches else n_contours + n_patches, points.n_sources)
     arcs = divide_points(points, count)
     outer = arcs.select(np.flatnonzero(arcs.contour == 0))
     shares = boundary_contexts(boundary_response(outer, rho * shape.size))
