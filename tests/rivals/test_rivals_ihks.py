@@ -123,3 +123,12 @@ def test_times_at_which_all_heat_is_even_count_for_nothing() -> None:
     distances = rival.compare([first, first, second])
     assert np.isfinite(distances).all()
     np.testing.assert_array_equal(distances[0, 1], 0)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"), [("n_pairs", 1), ("n_times", 0), ("n_words", 0), ("softness", -1.0)]
+)
+def test_numbers_out_of_range_are_refused(parameter: str, value: float) -> None:
+    """When the system is made, by the name of the parameter."""
+    with pytest.raises(ParameterError, match=f"{parameter}={value}.* expected at least"):
+        IHKS(**{parameter: value})  # type: ignore[arg-type]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from spem.errors import ShapeError
+from spem.errors import ParameterError, ShapeError
 from spem.rivals.sd_gdm import SDGDM, geodesic_matrix, largest_values
 from spem.shapes.read import read
 from spem.shapes.shape import Shape
@@ -101,3 +101,10 @@ def test_poses_of_one_class_are_nearer(data_dir):
     shapes = [read(data_dir / "shrec11" / f, voxels=500) for f in files]
     distances = rival.compare([rival.describe(shape) for shape in shapes])
     assert distances[0, 1] < 0.5 * distances[0, 2]
+
+
+@pytest.mark.parametrize(("parameter", "value"), [("n_values", 0), ("samples", 1)])
+def test_numbers_out_of_range_are_refused(parameter: str, value: float) -> None:
+    """When the system is made, by the name of the parameter."""
+    with pytest.raises(ParameterError, match=f"{parameter}={value}.* expected at least"):
+        SDGDM(**{parameter: value})  # type: ignore[arg-type]

@@ -116,3 +116,10 @@ def test_poses_are_nearer_than_classes(data_dir: Path) -> None:
     rival = ShapeDNA()
     distances = rival.compare([rival.describe(spem.read(folder / file, voxels=500)) for file in files])
     assert distances[0, 1] < distances[0, 2]
+
+
+@pytest.mark.parametrize(("parameter", "value"), [("n_values", 0), ("n_values", -1)])
+def test_numbers_out_of_range_are_refused(parameter: str, value: float) -> None:
+    """When the system is made, by the name of the parameter."""
+    with pytest.raises(ParameterError, match=f"{parameter}={value}.* expected at least"):
+        ShapeDNA(**{parameter: value})  # type: ignore[arg-type]

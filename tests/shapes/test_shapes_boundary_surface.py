@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from spem.codes.sources import source_hash
-from spem.errors import ShapeError
+from spem.errors import ParameterError, ShapeError
 from spem.shapes.boundary_surface import boundary_surface
 from spem.shapes.meshes import mesh_shape
 from spem.shapes.rescale import to_voxel_budget
@@ -109,6 +109,12 @@ def test_other_dimensions_are_refused(ndim: int) -> None:
     """Only solids have boundary surfaces."""
     with pytest.raises(ShapeError, match=f"shapes of 3 dimensions, this one has {ndim}"):
         boundary_surface(Shape.from_mask(np.ones((3,) * ndim)))
+
+
+def test_a_path_is_no_shape() -> None:
+    """It is to be read first."""
+    with pytest.raises(ParameterError, match="expected Shape, got str; read it first"):
+        boundary_surface("ball.off")  # type: ignore[arg-type]
 
 
 def test_surface_goes_with_its_shape(ball: trimesh.Trimesh) -> None:

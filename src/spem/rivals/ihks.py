@@ -81,6 +81,13 @@ class IHKS:
     softness: float = 2.0
     standardised: bool = True
 
+    def __post_init__(self) -> None:
+        least = {"n_pairs": 2, "n_times": 1, "samples": 1, "n_words": 1, "softness": 0}
+        for parameter, bound in least.items():
+            if getattr(self, parameter) < bound:
+                msg = f"{parameter}={getattr(self, parameter)}: expected at least {bound}"
+                raise ParameterError(msg)
+
     @property
     def name(self) -> str:
         """Name in tables."""

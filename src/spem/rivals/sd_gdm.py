@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigvalsh
 from scipy.sparse.linalg import eigsh
 
-from spem.errors import ShapeError
+from spem.errors import ParameterError, ShapeError
 from spem.rivals.extra import require
 from spem.shapes.boundary_surface import boundary_surface
 from spem.shapes.shape import Shape
@@ -56,6 +56,11 @@ class SDGDM:
 
     n_values: int = 50
     samples: int = 2500
+
+    def __post_init__(self) -> None:
+        if self.n_values < 1 or self.samples < 2:
+            msg = f"n_values={self.n_values}, samples={self.samples}: expected at least 1 value of 2 points"
+            raise ParameterError(msg)
 
     @property
     def name(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
+from spem.errors import ParameterError
 from spem.fields.surface_spectrum import solve_surface_spectrum
 from spem.rivals.solid_spectrum import dirichlet_values
 from spem.shapes.boundary_surface import boundary_surface
@@ -64,6 +65,11 @@ class ShapeDNA:
     reweighted: bool = False
     n_values: int | None = None
     n_vertices: int = 1000
+
+    def __post_init__(self) -> None:
+        if self.n_values is not None and self.n_values < 1:
+            msg = f"n_values={self.n_values}: expected at least 1"
+            raise ParameterError(msg)
 
     @property
     def name(self) -> str:

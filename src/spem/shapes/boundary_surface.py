@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from skimage.measure import marching_cubes
 
-from spem.errors import ShapeError
+from spem.errors import ShapeError, require_kind
 from spem.shapes.distance import signed_distance
 from spem.shapes.shape import Shape
 from spem.shapes.surface import Surface, count_of
@@ -54,6 +54,7 @@ def boundary_surface(shape: Shape) -> Surface:
     >>> surface.closed, surface.repairs, round(surface.area / (4 * np.pi * 64), 2)
     (True, ('surface taken from the grid',), 0.99)
     """
+    require_kind(shape, Shape, "read it first: spem.read(...)")
     if shape.ndim != 3:
         msg = f"{shape.name}: a boundary surface is of shapes of 3 dimensions, this one has {shape.ndim}"
         raise ShapeError(msg)
