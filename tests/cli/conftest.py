@@ -96,7 +96,7 @@ def codes(folder: Path, tmp_path: Path, spem: Callable[..., Result]) -> Path:
     return path
 
 
-QUICK = ("--own-grid", "--n-maps", "3", "--n-centers", "4", "--n-rho", "16")
+QUICK = ("--own-grid", "--features", "spem", "--n-maps", "3", "--n-centers", "4", "--n-rho", "16")
 
 
 def ellipse(a: float, b: float, half: int = 18) -> np.ndarray:

@@ -28,7 +28,7 @@ Spem = Callable[..., Result]
 Start = Callable[..., subprocess.Popen[str]]
 
 N_MANY = 80
-QUICK = ("--own-grid", "--n-maps", "3", "--n-centers", "4", "--n-rho", "16")
+QUICK = ("--own-grid", "--features", "spem", "--n-maps", "3", "--n-centers", "4", "--n-rho", "16")
 
 
 def ellipse(a: float, b: float, half: int = 18) -> np.ndarray:
@@ -345,6 +345,7 @@ def test_report_shows_the_maps_of_the_codes(
 ) -> None:
     """The maps in a report are those of the first band, by the scheme and the centring of the settings."""
     settings = Settings(
+        features="spem",
         voxels=None,
         rho_ranges=((0.05, 0.2), (0.2, 0.4)),
         n_maps=5,
@@ -419,7 +420,7 @@ def test_stopped_encode_goes_on(start: Start, spem: Spem, tmp_path: Path) -> Non
     """After kill -9 and after Ctrl-C the same command goes on; the codes are those of one run."""
     shapes = _many(tmp_path)
     target, work = tmp_path / "c.spem", tmp_path / "c.spem.work"
-    options = ("--n-maps", 3, "--n-centers", 4, "--voxels", 9000, "-j", 2)
+    options = ("--features", "spem", "--n-maps", 3, "--n-centers", 4, "--voxels", 9000, "-j", 2)
     with start("encode", shapes, "-o", target, *options) as first:
         _wait_for(work, 5, first)
         os.kill(first.pid, signal.SIGKILL)
