@@ -168,7 +168,8 @@ class Settings:
             usual = (entry.default, *(TRAITS[kind].defaults.get(entry.name) for kind in chosen))
             if kinds and not set(kinds) & set(chosen) and getattr(self, entry.name) not in usual:
                 of, these = " or ".join(map(repr, kinds)), "+".join(chosen)
-                msg = f"{entry.name}: a setting of features {of}, not of {these!r}; leave it out, or name such features"
+                advice = "leave it out, or name such features"
+                msg = f"{entry.name}: a setting of features {of}, not of {these!r}; {advice}"
                 raise ParameterError(msg)
 
     def _kinds(self, ndim: int | None) -> tuple[str, ...]:
