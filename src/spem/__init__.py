@@ -6,14 +6,10 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from spem.embedding.boundary_contexts import boundary_contexts
-    from spem.embedding.boundary_response import BoundaryResponse
-    from spem.embedding.boundary_response import boundary_response
-    from spem.codes.joining import fusion_weights
-    from spem.codes.joining import join_codes
     from spem.api.fields import field, maps, sweep
     from spem.api.parts import parts, source_fields, sources
     from spem.codes.codes import Codes, Failure
+    from spem.codes.joining import fusion_weights, join_codes
     from spem.codes.model import Model
     from spem.codes.moments import NodalMoments, hu_moments
     from spem.codes.settings import Settings
@@ -29,6 +25,8 @@ if TYPE_CHECKING:
     from spem.decomposition.parts import Parts
     from spem.decomposition.sparse_coding import NonnegativeSparseCoding
     from spem.decomposition.transfer import vertex_labels
+    from spem.embedding.boundary_contexts import boundary_contexts
+    from spem.embedding.boundary_response import BoundaryResponse, boundary_response
     from spem.embedding.correspondence import correspond, match_nodes, surroundings
     from spem.embedding.heat import diffusion_distance, heat_kernel
     from spem.embedding.maps import Maps

@@ -15,6 +15,7 @@ from spem.retrieval.evaluation import evaluate
 from spem.retrieval.labels import read_labels
 from spem.shapes.creatures import collection, creature
 from spem.shapes.read import read
+from spem.shapes.shape import Shape
 from spem.shapes.synthetic import ball
 
 KINDS = pytest.mark.parametrize("kind", ["shape-context", "inner-distance"])
@@ -28,14 +29,27 @@ def creatures():
 
 @KINDS
 def test_features_are_roots_of_the_shares(kind):
-    """By default 128 points have 64 values each, in float32, whose squares add up to one."""
+    """By default 128 points and their mirror images have 64 values each, whose squares add up to one."""
     hand = creature("hand", ndim=2, voxels=1500, rng=np.random.default_rng(3))
     (found,) = contour_features(hand, Settings(features=kind))
     context = shape_context if kind == "shape-context" else inner_distance_shape_context
-    assert (found.shape, found.dtype) == ((128, 64), np.float32)
-    np.testing.assert_allclose(np.square(found), context(hand), atol=1e-6)
+    assert (found.shape, found.dtype) == ((256, 64), np.float32)
+    np.testing.assert_allclose(np.square(found[:128]), context(hand), atol=1e-6)
     (outer,) = contour_features(hand, Settings(features=kind, boundary="voxel"))
-    np.testing.assert_allclose(np.square(outer), context(hand, boundary="voxel"), atol=1e-6)
+    np.testing.assert_allclose(np.square(outer[:128]), context(hand, boundary="voxel"), atol=1e-6)
+
+
+@KINDS
+def test_mirror_images_have_the_features_of_the_shape(kind):
+    """Each row of a hand has its like among those of its mirror image, but for where points start."""
+    hand = Shape.from_mask(creature("hand", ndim=2, voxels=2500, rng=np.random.default_rng(3)).mask)
+    turned = Shape.from_mask(hand.mask[::-1])
+    (one,), (two,) = (contour_features(shape, Settings(features=kind)) for shape in (hand, turned))
+    to_own = np.linalg.norm(one[:128, None] - two[None, :128], axis=2).min(axis=1).mean()
+    to_mirrored = np.linalg.norm(one[:128, None] - two[None, 128:], axis=2).min(axis=1).mean()
+    assert to_mirrored < 0.6 * to_own
+    means = [np.sort(features.mean(axis=0)) for features in (one, two)]
+    np.testing.assert_allclose(*means, atol=0.01)
 
 
 @KINDS

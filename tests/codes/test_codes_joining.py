@@ -53,16 +53,17 @@ def test_constant_code_of_a_kind_has_no_say():
 
 
 def test_weights_even_out_the_spreads():
-    """Weighted, the distances of each kind have one standard deviation, whatever labels there may be."""
+    """Ratios of weights are those of the inverse spreads for many shapes, their roots for twenty."""
     rng = np.random.default_rng(1)
-    tight = 5 + rng.random((30, 40)) + 3 * rng.random(40)
-    wide = rng.normal(size=(30, 3))
-    weights = fusion_weights([tight, wide])
-    upper = np.triu_indices(30, 1)
-    spreads = [correlation_distance(kind, kind)[upper].std() for kind in (tight, wide)]
-    np.testing.assert_allclose(weights[0] * spreads[0], weights[1] * spreads[1])
-    assert weights.sum() == pytest.approx(1)
-    assert weights[0] > weights[1]
+    for n, power in ((20, 0.5), (400, 400 / 420)):
+        tight = 5 + rng.random((n, 40)) + 3 * rng.random(40)
+        wide = rng.normal(size=(n, 3))
+        weights = fusion_weights([tight, wide])
+        upper = np.triu_indices(n, 1)
+        spreads = [correlation_distance(kind, kind)[upper].std() for kind in (tight, wide)]
+        np.testing.assert_allclose(weights[0] / weights[1], (spreads[1] / spreads[0]) ** power)
+        assert weights.sum() == pytest.approx(1)
+        assert weights[0] > weights[1]
 
 
 @pytest.mark.parametrize("codes", [[[[1.0, 2.0]], [[3.0, 1.0, 2.0]]], [np.eye(3) * 0 + [1, 2, 3], np.eye(3)]])

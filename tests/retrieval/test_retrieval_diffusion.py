@@ -86,7 +86,7 @@ def test_given_distances_stay() -> None:
     [
         (np.zeros((2, 3)), {}, "square"),
         (np.full((12, 12), np.nan), {}, "nan or infinity, first in row 0"),
-        (np.zeros((5, 5)), {}, "n_neighbours 10, expected 1 to 4"),
+        (np.zeros((5, 5)), {"n_neighbours": 5}, "n_neighbours 5, expected 1 to 4"),
         (np.zeros((5, 5)), {"n_neighbours": 2.5}, "n_neighbours=2.5 must be a whole number"),
         (np.zeros((12, 12)), {"weight": 1.0}, "weight 1.0"),
     ],

@@ -63,3 +63,16 @@ def test_surface_without_area_has_no_points(sphere: Surface) -> None:
         spread_points(Surface(0 * sphere.vertices, sphere.faces), 5)
     with pytest.raises(ParameterError, match="count=0: expected at least 1"):
         spread_points(sphere, 0)
+
+
+def test_order_of_faces_and_corners_moves_no_point():
+    """A file of the same mesh, its faces shuffled and their corners rolled, gives the same points."""
+    rng = np.random.default_rng(0)
+    mesh = trimesh.creation.icosphere(2)
+    vertices = np.asarray(mesh.vertices) * [1.0, 1.3, 1.7] + 0.05 * rng.random(mesh.vertices.shape)
+    faces = np.asarray(mesh.faces, np.int64)
+    shuffled = np.stack([np.roll(face, rng.integers(3)) for face in rng.permutation(faces)])
+    one, two = (
+        spread_points(Surface(vertices, each), 500).interpolate(vertices) for each in (faces, shuffled)
+    )
+    np.testing.assert_allclose(one, two, atol=1e-12)

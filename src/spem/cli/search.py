@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from spem.codes.codes import Codes
     from spem.retrieval.evaluation import Scores
 
-# Shapes that each is joined to in diffusion. More than there are in a class would join classes, and small
-# collections have small ones, so it is a share of them at most.
-NEIGHBOURS, NEIGHBOUR_SHARE = 10, 1 / 20
 REPORT = "report.html"
 
 
@@ -123,8 +120,7 @@ def evaluate(
     if rerank:
         from spem.retrieval.diffusion import rerank as diffused
 
-        neighbours = max(1, min(NEIGHBOURS, int(NEIGHBOUR_SHARE * len(classes))))
-        reranked = score_distances(diffused(distances, n_neighbours=neighbours), classes)
+        reranked = score_distances(diffused(distances), classes)
         facts["after_diffusion"] = {**reranked.mean(), "bulls_eye": reranked.bulls_eye}
     if split is not None:
         facts["classification"] = classification(collection, classes, split, repeats, seed)

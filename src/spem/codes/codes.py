@@ -99,7 +99,13 @@ class Codes:
         if model.digest == self.model.digest:
             return
         mine, theirs = self.model.settings.to_json(), model.settings.to_json()
-        odd = [f"{key} {theirs[key]} against {mine[key]}" for key in mine if mine[key] != theirs[key]]
+        # What several kinds leave to each of them says nothing beside what one kind has.
+        odd = [
+            f"{key} {theirs[key]} against {mine[key]}"
+            for key in mine
+            if mine[key] != theirs[key]
+            and (mine["features"] == theirs["features"] or None not in (mine[key], theirs[key]))
+        ]
         why = "; ".join(odd) or "the same settings but another vocabulary"
         msg = (
             f"{name} has model {model.digest}, these codes have {self.model.digest} ({why}); "

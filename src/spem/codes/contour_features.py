@@ -18,7 +18,8 @@ _CONTEXTS = {"shape-context": shape_context, "inner-distance": inner_distance_sh
 def contour_features(shape: Shape, settings: Settings, threads: int | None = None) -> Bands:
     """Compute the shape contexts that the settings name, at points spread evenly along the contours.
 
-    The roots of the shares are taken, so that rare directions count (the Hellinger distance).
+    The roots of the shares are taken, so that rare directions count (the Hellinger distance). Each point
+    counts a second time as it is in the mirror image of the shape, so that both have the same code.
 
     Parameters
     ----------
@@ -32,7 +33,7 @@ def contour_features(shape: Shape, settings: Settings, threads: int | None = Non
     Returns
     -------
     tuple
-        One band, ``(128, 64)`` in float32: eight distances by eight directions.
+        One band, ``(256, 64)`` in float32: eight distances by eight directions.
 
     Raises
     ------
@@ -44,8 +45,12 @@ def contour_features(shape: Shape, settings: Settings, threads: int | None = Non
     >>> from spem.shapes.synthetic import disk
     >>> settings = Settings(features="shape-context")
     >>> contour_features(disk(radius=10.0, spacing=1.0), settings)[0].shape
-    (128, 64)
+    (256, 64)
     """
     context = _CONTEXTS[settings.features]
     shares = context(shape, N_POINTS, n_radii=N_RADII, n_angles=N_ANGLES, boundary=settings.boundary)
-    return (np.sqrt(shares).astype(np.float32),)
+    values = np.sqrt(shares).astype(np.float32)
+    # From the tangent, a direction θ becomes π − θ; bins lie about multiples of 2π / 8.
+    turned = (N_ANGLES // 2 - np.arange(N_ANGLES)) % N_ANGLES
+    mirrored = values.reshape(-1, N_RADII, N_ANGLES)[:, :, turned].reshape(values.shape)
+    return (np.vstack([values, mirrored]),)

@@ -11,6 +11,8 @@ from spem.errors import ParameterError
 
 # A code whose deviation from its mean is below this part of its length is constant to rounding.
 _CONSTANT = 1e-13
+# With so many shapes weights are halfway between equal ones and the inverse spreads, in logarithms.
+_FEW_SHAPES = 20
 
 
 def join_codes(codes: Sequence[ArrayLike], weights: ArrayLike | None = None) -> NDArray[np.float64]:
@@ -58,7 +60,8 @@ def fusion_weights(codes: Sequence[ArrayLike]) -> NDArray[np.float64]:
     """Weigh kinds of codes by how far apart they hold the same shapes; no label enters.
 
     The weight of a kind is the inverse of the standard deviation of its correlation distances, so that in
-    their sum no kind drowns another because its distances spread more.
+    their sum no kind drowns another because its distances spread more. The spreads of a few shapes tell
+    little: of n of them the power n / (n + 20) is taken, which leaves weights nearly equal.
 
     Parameters
     ----------
@@ -93,7 +96,8 @@ def fusion_weights(codes: Sequence[ArrayLike]) -> NDArray[np.float64]:
     spreads = np.array([_spread(array) for array in arrays])
     if not (spreads > 0).all():
         return np.full(len(spreads), 1 / len(spreads))
-    return np.asarray((1 / spreads) / (1 / spreads).sum())
+    inverse = (spreads.min() / spreads) ** (len(arrays[0]) / (len(arrays[0]) + _FEW_SHAPES))
+    return np.asarray(inverse / inverse.sum())
 
 
 def _require_finite(codes: Sequence[NDArray[np.float64]]) -> None:

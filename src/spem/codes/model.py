@@ -21,8 +21,8 @@ from spem.codes.part import Part
 from spem.codes.settings import Settings
 from spem.errors import ModelError, ParameterError
 
-# Training shapes whose distances tell the weights of the parts: in random order, more of them move these by
-# less than a percent.
+# Training shapes, spread evenly over all, whose distances tell the weights of the parts: more of them move
+# these by less than a percent.
 _WEIGHING_SHAPES = 200
 
 
@@ -89,14 +89,19 @@ class Model:
         if len(chosen) == 1:
             return cls(resolved, (Part.fit(chosen[0], shapes),), ndim=ndim)
         again = list(shapes) if isinstance(shapes, Iterator) else shapes
-        slices = _slices(chosen)
-        parts = tuple(
-            Part.fit(each, (_bands(bands, slices[-1].stop)[where] for bands in again))
-            for each, where in zip(chosen, slices, strict=True)
-        )
+        slices, count = _slices(chosen), 0
+
+        def passed(where: slice) -> Iterator[Any]:
+            """Yield the bands of one kind, and count the shapes."""
+            nonlocal count
+            for count, bands in enumerate(again, 1):  # noqa: B007
+                yield _bands(bands, slices[-1].stop)[where]
+
+        parts = tuple(Part.fit(each, passed(where)) for each, where in zip(chosen, slices, strict=True))
         unweighted = cls(resolved, parts, (1.0,) * len(parts), ndim)
-        codes = [unweighted.codes(bands) for bands in islice(again, _WEIGHING_SHAPES)]
-        weights = fusion_weights([np.stack(kind) for kind in zip(*codes, strict=True)])
+        some = islice(again, 0, None, -(-count // _WEIGHING_SHAPES))
+        codes = zip(*map(unweighted.codes, some), strict=True)
+        weights = fusion_weights([np.stack(kind) for kind in codes])
         return cls(resolved, parts, tuple(weights.tolist()), ndim)
 
     @property

@@ -123,4 +123,4 @@ def kinds_of(features: str, ndim: int | None) -> tuple[str, ...]:
             msg = f"features {word!r} are of {shapes} shapes, not of {ndim}-D ones; take features 'spem'"
             raise ParameterError(msg)
         kinds.extend(_SURFACE.get(ndim or 0, ("spem",)) if word == SURFACE else (word,))
-    return tuple(dict.fromkeys(kinds))
+    return tuple(kind for kind in TRAITS if kind in kinds)

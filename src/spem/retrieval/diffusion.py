@@ -16,9 +16,13 @@ from spem.retrieval.distances import min_max
 
 # Similarities are at most 1; what is below comes from rounding of the solve.
 _UNJOINED = 1e-12
+# Small collections have small classes: more neighbours would join them.
+_NEIGHBOURS, _SHAPES_A_NEIGHBOUR = 10, 20
 
 
-def rerank(distances: ArrayLike, *, n_neighbours: int = 10, weight: float = 0.9) -> NDArray[np.float64]:
+def rerank(
+    distances: ArrayLike, *, n_neighbours: int | None = None, weight: float = 0.9
+) -> NDArray[np.float64]:
     """Return distances after diffusion over the graph of nearest neighbours.
 
     The affinities exp(−d²/σ_i σ_j) of a shape to its nearest neighbours, σ_i the distance to the last of them
@@ -34,7 +38,8 @@ def rerank(distances: ArrayLike, *, n_neighbours: int = 10, weight: float = 0.9)
         ``(n, n)`` distances of a collection's shapes to each other; where both directions differ, their mean
         is taken.
     n_neighbours
-        Neighbours that a shape is joined to, below n and best below the size of a class.
+        Neighbours that a shape is joined to, below n and best below the size of a class; by default a
+        twentieth of the shapes, from 1 to 10.
     weight
         α, in (0, 1): how far affinities spread.
 
@@ -58,6 +63,8 @@ def rerank(distances: ArrayLike, *, n_neighbours: int = 10, weight: float = 0.9)
     >>> distances[0, 4] > distances[0, 5], rerank(distances, n_neighbours=2)[0, 4] < 1
     (np.True_, np.True_)
     """
+    if n_neighbours is None:
+        n_neighbours = max(1, min(_NEIGHBOURS, len(np.asarray(distances)) // _SHAPES_A_NEIGHBOUR))
     given = _checked(distances, n_neighbours, weight)
     affinity = _affinities(given, n_neighbours)
     scale = 1 / np.sqrt(affinity.sum(axis=1))

@@ -11,7 +11,7 @@ from spem.errors import ParameterError, ShapeError
 from spem.shapes.surface import Surface
 
 # Steps of the sequence of least discrepancy in the plane: powers of 1 / x, x³ = x + 1.
-_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
+_STRIDES = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +40,9 @@ class SurfacePoints:
 def spread_points(surface: Surface, count: int) -> SurfacePoints:
     """Spread points over a surface, as many on each part of it as its share of the area.
 
-    They are the same whenever asked for: equal steps of area from face to face, in the order of the faces,
-    and within faces a sequence of low discrepancy.
+    They are the same whenever asked for: equal steps of area from face to face, small faces first, and within
+    faces a sequence of low discrepancy. In what order faces and their corners stand does not matter, but for
+    faces of one size.
 
     Parameters
     ----------
@@ -67,12 +68,27 @@ def spread_points(surface: Surface, count: int) -> SurfacePoints:
     if count < 1:
         msg = f"count={count}: expected at least 1 point"
         raise ParameterError(msg)
-    reach = np.cumsum(surface.face_areas)
+    faces, areas = _ordered(surface)
+    reach = np.cumsum(areas)
     if not reach[-1] > 0:
         msg = "the surface has no area; no points can be spread over it"
         raise ShapeError(msg)
     face = np.searchsorted(reach, (np.arange(count) + 0.5) / count * reach[-1])
-    side, along = (np.arange(1, count + 1)[:, None] * _STEPS % 1.0).T
+    side, along = (np.arange(1, count + 1)[:, None] * _STRIDES % 1.0).T
     root = np.sqrt(side)
     weights = np.stack([1 - root, root * (1 - along), root * along], axis=1)
-    return SurfacePoints(surface.faces[face], weights)
+    return SurfacePoints(faces[face], weights)
+
+
+def _ordered(surface: Surface) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return faces by size, each from the corner across its longest edge, and their areas."""
+    corners = surface.vertices[surface.faces]
+    across = _steps(np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1), axis=2))
+    place = (across.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    order = np.lexsort((across.max(axis=1), _steps(surface.face_areas)))
+    return np.take_along_axis(surface.faces, place, axis=1)[order], surface.face_areas[order]
+
+
+def _steps(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return sizes in whole steps, so that rounding does not tell equal ones apart."""
+    return np.asarray(np.rint(sizes / max(sizes.max(), np.finfo(np.float64).tiny) * 2**20))
