@@ -107,17 +107,20 @@ def encode(
 ) -> None:
     """Make the codes of a collection.
 
-    Fields, maps, a vocabulary learnt from them, and a code for each shape; a label volume gives one shape a
-    label. Files that fail are told, one line each, and the others saved. When CODES is there already, new
-    files are added with its vocabulary and settings, and what has not changed is reused.
-    An interrupted run goes on from CODES.work when the same command is given again.
+    Features of each shape, a vocabulary learnt from them, and a code for each shape; a label volume gives one
+    shape a label. Solids are coded by SPEM maps and surface, silhouettes by boundary sources and contours, unless
+    --features says otherwise: kinds joined by +, of spem, surface, sources, shape-context, inner-distance,
+    surface-wks, surface-si-hks, surface-hks, wks, si-hks, hks. Settings of maps need spem among them.
+    Files that fail are told, one line each, and the others saved. When CODES is there already, new files are
+    added with its vocabulary and settings, and what has not changed is reused. An interrupted run goes on
+    from CODES.work when the same command is given again.
 
     \b
     Examples:
       spem encode shapes/ -o shapes.spem
       spem encode 'scans/**/*.off' -o scans.spem --voxels 60000 --jobs 4
       spem encode new/ -o new.spem --vocabulary shapes.spem
-      spem encode shapes/ -o waves.spem --features wks
+      spem encode shapes/ -o maps.spem --features spem --n-maps 6
       spem encode more/ -o shapes.spem                      adds to shapes.spem
     """  # noqa: D301
     from spem.codes.settings import Settings
