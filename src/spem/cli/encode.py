@@ -108,9 +108,9 @@ def encode(
     """Make the codes of a collection.
 
     Features of each shape, a vocabulary learnt from them, and a code for each shape; a label volume gives one
-    shape a label. Solids are coded by SPEM maps and surface, silhouettes by boundary sources and contours, unless
-    --features says otherwise: kinds joined by +, of spem, surface, sources, shape-context, inner-distance,
-    surface-wks, surface-si-hks, surface-hks, wks, si-hks, hks. Settings of maps need spem among them.
+    shape a label. Solids are coded by SPEM maps and surface, silhouettes by boundary sources and contours,
+    unless --features says otherwise: kinds joined by +, of spem, surface, sources, shape-context,
+    inner-distance, surface-wks, surface-si-hks, surface-hks, wks, si-hks, hks. Settings of maps need spem.
     Files that fail are told, one line each, and the others saved. When CODES is there already, new files are
     added with its vocabulary and settings, and what has not changed is reused. An interrupted run goes on
     from CODES.work when the same command is given again.
