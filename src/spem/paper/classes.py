@@ -53,7 +53,7 @@ def classify_silhouettes(found: Collection, *, quick: bool) -> tuple[list[Shape]
     >>> len(classify_silhouettes(few, quick=True)[1])
     3
     """
-    settings = Settings(features="spem", voxels=PIXELS)
+    settings = Settings(features="spem", levels=1, voxels=PIXELS)
     settings = replace(settings, voxels=SMALL, n_centers=16) if quick else settings
     bands, fields = features_of(found.items, settings), hyperfields(found.items)
     maps = maps_over(fields)
@@ -83,7 +83,8 @@ def classify_meshes(found: Collection, *, quick: bool) -> dict[str, Classificati
     >>> list(classify_meshes(few, quick=True))
     ['meshes, 10 for training', 'meshes, 16 for training']
     """
-    settings = Settings(features="spem", voxels=SMALL, n_centers=16) if quick else Settings(features="spem")
+    settings = Settings(features="spem", levels=1)
+    settings = replace(settings, voxels=SMALL, n_centers=16) if quick else settings
     bands = features_of(found.items, settings)
     outside = creature_features(3, 1 if quick else EACH, settings) if found.real else bands
     codes = words(bands, outside, settings)
