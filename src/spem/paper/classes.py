@@ -105,7 +105,7 @@ def words(bands: Sequence[Bands], training: Sequence[Bands], settings: Settings)
     --------
     >>> bands = [(np.random.default_rng(seed).random((20, 8)),) for seed in range(3)]
     >>> words(bands, bands, Settings(features="spem", n_centers=4)).shape
-    (3, 64)
+    (3, 256)
     """
     model = Model.fit(settings, training)
     return np.stack([model.encode(each) for each in bands])
