@@ -202,12 +202,12 @@ def classify(
     Examples
     --------
     >>> import numpy as np, spem
-    >>> disks = [spem.synthetic.disk(radius=r, spacing=1.0) for r in (8.0, 9.0, 10.0)]
-    >>> stars = [spem.synthetic.star_polygon(n, 2) for n in (5, 6, 7)]
-    >>> codes = spem.encode(disks + stars, voxels=None, n_centers=8)
-    >>> found = spem.classify(codes, ["disk"] * 3 + ["star"] * 3, n_train=2, repeats=20)
+    >>> rng = np.random.default_rng(0)
+    >>> pairs = spem.creatures.collection(n_per_class=3, kinds=["fish", "hand"], voxels=800, rng=rng)
+    >>> shapes, kinds = zip(*pairs)
+    >>> found = spem.classify(spem.encode(shapes, voxels=None), kinds, n_train=2, repeats=20)
     >>> found.classes, found.accuracies.size, found.mean > 50
-    (('disk', 'star'), 20, True)
+    (('fish', 'hand'), 20, True)
     """
     if isinstance(codes, (Codes, str, Path)):
         collection, classes = _with_classes(codes, labels, ignore_unlabelled=ignore_unlabelled)

@@ -120,7 +120,7 @@ def encode(
       spem encode shapes/ -o shapes.spem
       spem encode 'scans/**/*.off' -o scans.spem --voxels 60000 --jobs 4
       spem encode new/ -o new.spem --vocabulary shapes.spem
-      spem encode shapes/ -o maps.spem --features spem --n-maps 6
+      spem encode shapes/ -o maps.spem --features spem
       spem encode more/ -o shapes.spem                      adds to shapes.spem
     """  # noqa: D301
     from spem.codes.settings import Settings

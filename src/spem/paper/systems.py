@@ -220,8 +220,9 @@ def describe_all(
     Examples
     --------
     >>> from spem.shapes.synthetic import disk
-    >>> describe_all([disk(3.0, 1.0)], {"nodes": lambda shape: shape.n_nodes}, Settings())["nodes"].values
-    (29,)
+    >>> plain = Settings(voxels=None)
+    >>> describe_all([disk(3.0, 1.0)], {"nodes": lambda shape: shape.n_nodes}, plain)["nodes"].values
+    (25,)
     """
     work = partial(_describe, items=tuple(items), systems=dict(systems), settings=settings)
     found = compute_all(work, items)
