@@ -111,17 +111,13 @@ def evaluate(
         check_folder(report)
     from spem.codes.workers import count_processes
     from spem.retrieval.distances import correlation_distance
-    from spem.retrieval.evaluation import evaluate as score_distances
 
     collection, classes = _load_labelled(codes, labels, ignore_unlabelled=ignore_unlabelled)
     distances = correlation_distance(collection.vectors, collection.vectors)
     scores = score(distances, classes)
     facts = summary(scores)
     if rerank:
-        from spem.retrieval.diffusion import rerank as diffused
-
-        reranked = score_distances(diffused(distances), classes)
-        facts["after_diffusion"] = {**reranked.mean(), "bulls_eye": reranked.bulls_eye}
+        facts["after_diffusion"] = after_diffusion(distances, classes)
     if split is not None:
         facts["classification"] = classification(collection, classes, split, repeats, seed)
     _tell(facts, json)
@@ -138,6 +134,15 @@ def evaluate(
             jobs=jobs or count_processes(len(collection)),
         )
         typer.echo(f"wrote {page}", err=to_stdout)
+
+
+def after_diffusion(distances: NDArray[np.float64], classes: list[str]) -> dict[str, float]:
+    """Score distances once more, after diffusion re-ranking."""
+    from spem.retrieval.diffusion import rerank
+    from spem.retrieval.evaluation import evaluate as score_distances
+
+    scores = score_distances(rerank(distances), classes)
+    return {**scores.mean(), "bulls_eye": scores.bulls_eye}
 
 
 def classification(codes: Codes, classes: list[str], n_train: int, repeats: int, seed: int) -> dict[str, Any]:
