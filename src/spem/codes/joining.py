@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from spem.errors import ParameterError
 
-# A code whose deviation from its mean is below this part of its length is constant to rounding.
-_CONSTANT = 1e-13
+# A vector whose deviation from its mean is below this part of its length is constant to rounding.
+CONSTANT = 1e-13
 # With so many shapes weights are halfway between equal ones and the inverse spreads, in logarithms.
 _FEW_SHAPES = 20
 
@@ -53,7 +53,7 @@ def join_codes(codes: Sequence[ArrayLike], weights: ArrayLike | None = None) -> 
     _require_finite(arrays)
     shares = _shares(weights, len(arrays))
     together = zip(shares, arrays, strict=True)
-    return np.concatenate([np.sqrt(share) * _standardised(array) for share, array in together], axis=-1)
+    return np.concatenate([np.sqrt(share) * standardised(array) for share, array in together], axis=-1)
 
 
 def fusion_weights(codes: Sequence[ArrayLike]) -> NDArray[np.float64]:
@@ -110,17 +110,28 @@ def _require_finite(codes: Sequence[NDArray[np.float64]]) -> None:
 
 def _spread(codes: NDArray[np.float64]) -> float:
     """Return the standard deviation of the correlation distances between different shapes."""
-    unit = _standardised(codes)
+    unit = standardised(codes)
     pairs = (unit @ unit.T)[np.triu_indices(len(unit), 1)]
     return float(pairs.std()) if pairs.size else 0.0
 
 
-def _standardised(codes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Bring codes to mean zero and unit length; constant ones to zeros."""
-    centred = codes - codes.mean(axis=-1, keepdims=True)
-    length = np.linalg.norm(centred, axis=-1, keepdims=True)
-    varied = length > _CONSTANT * np.linalg.norm(codes, axis=-1, keepdims=True)
-    return np.asarray(np.where(varied, centred / np.where(varied, length, 1.0), 0.0))
+def standardised(codes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bring vectors along the last axis to mean zero and unit length; constant ones to zeros.
+
+    Examples
+    --------
+    >>> standardised(np.array([[1.0, 3.0], [2.0, 2.0]])).round(3)
+    array([[-0.707,  0.707],
+           [ 0.   ,  0.   ]])
+    """
+    # Dividing by the largest entry first keeps the squares in range.
+    largest = np.abs(codes).max(axis=-1, keepdims=True, initial=0.0)
+    x = codes / np.where(largest > 0, largest, 1.0)
+    whole = np.linalg.norm(x, axis=-1, keepdims=True)
+    x = x - x.mean(axis=-1, keepdims=True) if x.shape[-1] else x
+    length = np.linalg.norm(x, axis=-1, keepdims=True)
+    varied = length > CONSTANT * whole
+    return np.asarray(np.where(varied, x / np.where(varied, length, 1.0), 0.0))
 
 
 def _shares(weights: ArrayLike | None, count: int) -> NDArray[np.float64]:

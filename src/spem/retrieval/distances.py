@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spem.codes.joining import standardised
 from spem.errors import ParameterError
-
-# A vector whose deviation from its mean is below this fraction of its norm is constant to rounding.
-CONSTANT = 1e-13
 
 
 def correlation_distance(queries: ArrayLike, codes: ArrayLike) -> NDArray[np.float64]:
@@ -138,11 +136,4 @@ def _standardised(vectors: ArrayLike, what: str) -> NDArray[np.float64]:
     if bad.size:
         msg = f"{what}: row {bad[0]} holds values that are not finite"
         raise ParameterError(msg)
-    # Dividing by the largest entry first keeps the squares in range.
-    largest = np.abs(x).max(axis=1, keepdims=True, initial=0.0)
-    x = x / np.where(largest > 0, largest, 1.0)
-    whole = np.linalg.norm(x, axis=1, keepdims=True)
-    x = x - x.mean(axis=1, keepdims=True) if x.shape[1] else x
-    norm = np.linalg.norm(x, axis=1, keepdims=True)
-    varied = norm > CONSTANT * whole
-    return np.asarray(np.where(varied, x / np.where(varied, norm, 1.0), 0.0))
+    return standardised(x)
