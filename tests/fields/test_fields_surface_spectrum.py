@@ -132,3 +132,12 @@ def test_surfaces_without_a_spectrum_are_refused(sphere: SurfaceSpectrum) -> Non
         solve_surface_spectrum(Surface(np.vstack([plain.vertices, [9, 9, 9]]), plain.faces), 3)
     with pytest.raises(ParameterError, match="n_pairs=37: expected 1 to 36"):
         sphere.truncated(37)
+
+
+@pytest.mark.parametrize("n_pairs", [9, 16, 36, 60, 100])
+def test_every_copy_of_a_multiple_value_is_found(n_pairs: int) -> None:
+    """However many pairs are asked for, there are 2l + 1 of the value l(l + 1), but of the last cut off."""
+    values = solve_surface_spectrum(icosphere(3), n_pairs).values
+    orders = np.arange(11)
+    expected = np.repeat(orders * (orders + 1.0), 2 * orders + 1)[:n_pairs]
+    assert np.allclose(values, expected, rtol=0.06, atol=1e-9)

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 _DENSE_NODES, _DENSE_SHARE = 400, 3
 # Of a surface of unit area, whose first values above zero are of order one to ten.
 _SHIFT = 1.0
+# Pairs beyond those wanted: the iteration on one vector finds copies of the last multiple values late.
+_SPARE = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,14 +189,15 @@ def _sparse(stiffness: Any, mass: Any, n_pairs: int, name: str) -> tuple[Array, 
         )
         values, vectors = scipy.sparse.linalg.eigsh(
             stiffness,
-            n_pairs,
+            min(n_pairs + _SPARE, stiffness.shape[0] - 1),
             mass,
             sigma=-_SHIFT,
             OPinv=scipy.sparse.linalg.LinearOperator(stiffness.shape, factor.solve, dtype=np.float64),
-            tol=0,  # to rounding: with less, copies of the multiple values of symmetric surfaces are missed
+            tol=0,
             v0=np.random.default_rng(0).random(stiffness.shape[0]),
         )
     except RuntimeError as error:
         msg = f"{name}: the eigenvalue iteration for {n_pairs} pairs failed ({error}); mend the mesh"
         raise ConvergenceError(msg.replace("\n", " ")) from error
-    return 1 / (values + _SHIFT), vectors
+    lowest = np.argsort(values)[:n_pairs]
+    return 1 / (values[lowest] + _SHIFT), vectors[:, lowest]
