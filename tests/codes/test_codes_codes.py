@@ -46,6 +46,15 @@ def test_other_vocabulary_is_refused():
     make().require_same_model(make("xy"))
 
 
+def test_joined_codes_are_refused_beside_codes_of_maps():
+    """The line names the features of both, and nothing that one of them leaves to its parts."""
+    rng = np.random.default_rng(0)
+    joined = Settings(features="spem+wks", n_maps=2, n_centers=3)
+    both = Model.fit(joined, [(rng.random((20, 2)), rng.random((9, 2))) for _ in range(4)], ndim=2)
+    with pytest.raises(ModelError, match=r"features spem\+wks against spem\); make both with one model"):
+        make().require_same_model(both)
+
+
 def test_join_and_take():
     """Collections of one model are joined in order, and shapes picked from them."""
     both = make("abc").join(make("de"))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from scipy.sparse.linalg import ArpackNoConvergence
 
 from spem.embedding.signatures import (
     heat_kernel_signature,
     scale_invariant_signature,
     wave_kernel_signature,
 )
-from spem.errors import ParameterError, ShapeError
+from spem.errors import ConvergenceError, ParameterError, ShapeError
 from spem.fields.surface_spectrum import SurfaceSpectrum, solve_surface_spectrum
 from spem.shapes.surface import Surface
 
@@ -141,3 +142,17 @@ def test_every_copy_of_a_multiple_value_is_found(n_pairs: int) -> None:
     orders = np.arange(11)
     expected = np.repeat(orders * (orders + 1.0), 2 * orders + 1)[:n_pairs]
     assert np.allclose(values, expected, rtol=0.06, atol=1e-9)
+
+
+def test_iteration_that_stops_short_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The line names the shape and the number of pairs, and what to do."""
+
+    def stop(*_: object, **__: object) -> None:
+        msg = "No convergence (9 iterations, 3/29 eigenvectors converged)"
+        raise ArpackNoConvergence(msg, None, None)
+
+    monkeypatch.setattr("scipy.sparse.linalg.eigsh", stop)
+    with pytest.raises(
+        ConvergenceError, match=r"^cat: the eigenvalue iteration for 9 pairs failed .*mend the"
+    ):
+        solve_surface_spectrum(icosphere(3), 9, name="cat")
