@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.shapes.shape import Cuts, Report, Shape
+from spem.shapes.surface import Surface
 
 
 def pack_shape(shape: Shape) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
@@ -29,6 +30,8 @@ def pack_shape(shape: Shape) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     }
     if shape.affine is not None:
         arrays["affine"] = shape.affine
+    if shape.surface is not None:
+        arrays |= {"surface_vertices": shape.surface.vertices, "surface_faces": shape.surface.faces}
     attributes: dict[str, Any] = {
         "name": shape.name,
         "grid": list(shape.mask.shape),
@@ -44,6 +47,7 @@ def unpack_shape(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) ->
     mask = np.zeros(attributes["grid"], bool)
     mask.reshape(-1)[arrays["voxels"]] = True
     report = attributes["report"]
+    has_surface = "surface_vertices" in arrays
     return Shape(
         mask,
         tuple(attributes["spacing"]),
@@ -52,4 +56,5 @@ def unpack_shape(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) ->
         Cuts(arrays["cut_voxel"], arrays["cut_direction"], arrays["cut_fraction"]),
         Report(**{**report, "repairs": tuple(report["repairs"])}),
         arrays.get("affine"),
+        Surface(arrays["surface_vertices"], arrays["surface_faces"]) if has_surface else None,
     )

@@ -1,0 +1,35 @@
+"""Packages that only the index needs, imported when they are used."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from spem.errors import MissingExtraError
+
+
+def require(module: str, extra: str = "index") -> Any:
+    """Import a module of an extra.
+
+    Parameters
+    ----------
+    module
+        Name of the module.
+    extra
+        The extra that brings it.
+
+    Raises
+    ------
+    MissingExtraError
+        When it is not installed.
+
+    Examples
+    --------
+    >>> require("math").pi > 3
+    True
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        msg = f"{module} is not installed; it comes with pip install 'spem[{extra}]'"
+        raise MissingExtraError(msg) from error

@@ -1,0 +1,1 @@
+"""The server: the index over HTTP, and the explorer in the browser."""
