@@ -103,6 +103,20 @@ def test_evaluate_scores(spem: Spem, folder: Path, codes: Path, tmp_path: Path) 
     assert "data:image/png" in page
 
 
+def test_size_alone_is_a_control(spem: Spem, folder: Path, codes: Path) -> None:
+    """What size alone would score stands beside the scores of codes, and sizes can be matched."""
+    options = ("evaluate", codes, "--labels", folder / "labels.csv")
+    facts = json.loads(spem(*options, "--json", "-").stdout)
+    assert set(facts["size_alone"]) == {*MEASURES, "bulls_eye"}
+    assert "size alone" in spem(*options).stdout
+    matched = json.loads(spem(*options, "--matched-size", "1.6", "--json", "-").stdout)
+    assert matched["matched_size"] == 1.6
+    assert matched["n_skipped"] < 9
+    refused = spem(*options, "--matched-size", "0.5")
+    assert refused.exit_code == 2
+    assert "at least 1" in refused.stderr
+
+
 def test_evaluate_classifies_when_asked(spem: Spem, folder: Path, codes: Path) -> None:
     """With --split the accuracy over splits comes beside the scores; the seed decides what it is."""
     options = ("evaluate", codes, "--labels", folder / "labels.csv", "--split", "2", "--repeats", "3")

@@ -301,3 +301,21 @@ def test_worker_that_dies_costs_its_task_only() -> None:
     outcomes = {task: (result, reason) for task, result, reason in run_all(_die, range(3), 2)}
     assert outcomes[1] == (None, "its process died, perhaps for want of memory")
     assert all(outcomes[task] == (task, "") for task in (0, 2))
+
+
+def test_volumes_are_kept_in_the_unit_of_the_file(tmp_path):
+    """Codes know the volume of each object of a segmentation, also after they are saved and joined."""
+    seg = np.zeros((30, 30), np.int16)
+    seg[2:12, 2:12], seg[16:20, 4:24] = 3, 8
+    np.savez(tmp_path / "seg.npz", labels=seg, spacing=[0.5, 2.0])
+    settings = Settings(features="spem", voxels=None, n_maps=2, n_centers=4, per_label=True)
+    codes = encode_collection([tmp_path / "seg.npz"], settings)
+    assert codes.names == ("seg-3", "seg-8")
+    np.testing.assert_allclose(codes.volumes, [100.0, 80.0])
+    codes.save(tmp_path / "codes.spem")
+    again = Codes.load(tmp_path / "codes.spem")
+    np.testing.assert_allclose(again.take([1]).join(again.take([0])).volumes, [80.0, 100.0])
+    reused = encode_collection([tmp_path / "seg.npz"], known=again)
+    np.testing.assert_allclose(reused.volumes, codes.volumes)
+    whole = Settings(features="spem", voxels=None, n_maps=2, n_centers=4, per_label=False)
+    assert encode_collection([tmp_path / "seg.npz"], whole).names == ("seg",)

@@ -250,3 +250,21 @@ def test_headers_are_checked_before_the_data_is_read(tmp_path):
     for name in ("z.npz", "z.nii.gz", "z.tif"):
         with pytest.raises(SizeError, match=r"300 cells need|30 cells need"):
             read_volume(tmp_path / name, memory_limit=1 << 20)
+
+
+def test_every_value_is_a_label_when_told(tmp_path):
+    """A segmentation that looks like grey levels or a mask gives one shape a value, if that is asked."""
+    grey = np.zeros((4, 9), np.uint8)
+    grey[1:3, 1:3], grey[1:3, 5:8] = 7, 255
+    np.save(tmp_path / "seg.npy", grey)
+    assert [shape.name for shape in read_labels(tmp_path / "seg.npy")] == ["seg"]
+    told = read_labels(tmp_path / "seg.npy", per_label=True)
+    assert [(shape.name, shape.volume) for shape in told] == [("seg-7", 4.0), ("seg-255", 6.0)]
+
+
+@pytest.mark.parametrize("values", [[[0.5, 1.0]], [[-1, 2]], [[0, 0]]])
+def test_values_that_are_no_labels_are_refused(tmp_path, values):
+    """Labels are whole numbers from zero up, not all zero."""
+    np.save(tmp_path / "seg.npy", np.asarray(values))
+    with pytest.raises(ShapeError, match="seg: its values are no labels"):
+        read_labels(tmp_path / "seg.npy", per_label=True)

@@ -22,7 +22,8 @@ from spem.cli.maps import maps
 from spem.cli.output import complain
 from spem.cli.paper import paper
 from spem.cli.parts import parts
-from spem.cli.search import evaluate, search
+from spem.cli.evaluate import evaluate
+from spem.cli.search import search
 from spem.errors import SizeError, SpemError
 
 DONE, PARTIAL, NOTHING, INTERRUPTED = 0, 1, 2, 130

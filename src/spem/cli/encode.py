@@ -98,6 +98,10 @@ def encode(
     dark: Annotated[
         bool | None, typer.Option("--dark/--light", help="Whether shapes are darker than the ground.")
     ] = None,
+    per_label: Annotated[
+        bool | None,
+        typer.Option("--per-label/--all-labels", help="Each label of a volume an object, or all one shape."),
+    ] = None,
     components: Annotated[ComponentsChoice | None, typer.Option(help="What is kept. [largest]")] = None,
     paper: Annotated[bool, typer.Option("--paper", help="Settings of the paper, section 5.5.")] = False,
     seed: Annotated[int | None, typer.Option(help="Seed of the vocabulary. [0]")] = None,
@@ -108,9 +112,10 @@ def encode(
     """Make the codes of a collection.
 
     Features of each shape, a vocabulary learnt from them, and a code for each shape; a label volume gives one
-    shape a label. Solids are coded by SPEM maps and surface, silhouettes by boundary sources and contours,
-    unless --features says otherwise: kinds joined by +, of spem, surface, sources, shape-context,
-    inner-distance, surface-wks, surface-si-hks, surface-hks, wks, si-hks, hks. Settings of maps need spem.
+    shape a label, with its size: --per-label where a segmentation does not look like one. Solids are coded by
+    SPEM maps and surface, silhouettes by boundary sources and contours, unless --features says otherwise:
+    kinds joined by +, of spem, surface, sources, shape-context, inner-distance,
+    surface-wks, surface-si-hks, surface-hks, wks, si-hks, hks. Settings of maps need spem.
     Files that fail are told, one line each, and the others saved. When CODES is there already, new files are
     added with its vocabulary and settings, and what has not changed is reused. An interrupted run goes on
     from CODES.work when the same command is given again.
@@ -121,6 +126,7 @@ def encode(
       spem encode 'scans/**/*.off' -o scans.spem --voxels 60000 --jobs 4
       spem encode new/ -o new.spem --vocabulary shapes.spem
       spem encode shapes/ -o maps.spem --features spem
+      spem encode seg.nii.gz -o objects.spem --per-label
       spem encode more/ -o shapes.spem                      adds to shapes.spem
     """  # noqa: D301
     from spem.codes.settings import Settings
@@ -146,6 +152,7 @@ def encode(
         drop_boundary=drop_boundary,
         threshold=threshold,
         dark=dark,
+        per_label=per_label,
         components=components,
         seed=seed,
     )

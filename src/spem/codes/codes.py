@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -56,6 +56,9 @@ class Codes:
         What they were made with.
     failures
         Files of the collection that got no code, and why.
+    volumes
+        ``(n_shapes,)`` volumes, areas in 2-D, in the unit of each file to the power of the dimension; nan
+        where they are not known, as of files from before they were kept.
     """
 
     names: tuple[str, ...]
@@ -64,11 +67,17 @@ class Codes:
     vectors: NDArray[np.float32]
     model: Model
     failures: tuple[Failure, ...] = ()
+    volumes: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vectors", np.ascontiguousarray(self.vectors, np.float32))
-        for field in ("names", "paths", "hashes", "failures"):
-            object.__setattr__(self, field, tuple(getattr(self, field)))
+        for column in ("names", "paths", "hashes", "failures"):
+            object.__setattr__(self, column, tuple(getattr(self, column)))
+        volumes = np.asarray(self.volumes, np.float64)
+        object.__setattr__(self, "volumes", volumes if volumes.size else np.full(len(self.names), np.nan))
+        if self.volumes.shape != (len(self.names),):
+            msg = f"volumes of shape {self.volumes.shape}; expected one for each of {len(self.names)} shapes"
+            raise ParameterError(msg)
         expected = (len(self.names), self.model.n_code)
         if self.vectors.shape != expected or not len(self.names) == len(self.paths) == len(self.hashes):
             msg = (
@@ -119,7 +128,8 @@ class Codes:
         names, paths, hashes = (
             tuple(column[i] for i in rows) for column in (self.names, self.paths, self.hashes)
         )
-        return replace(self, names=names, paths=paths, hashes=hashes, vectors=self.vectors[rows], failures=())
+        vectors, volumes = self.vectors[rows], self.volumes[rows]
+        return Codes(names, paths, hashes, vectors, self.model, volumes=volumes)
 
     def join(self, other: Codes) -> Codes:
         """Return these codes followed by others of the same model.
@@ -137,6 +147,7 @@ class Codes:
             np.concatenate([self.vectors, other.vectors]),
             self.model,
             self.failures + other.failures,
+            np.concatenate([self.volumes, other.volumes]),
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -149,7 +160,8 @@ class Codes:
             "failures": [[stored_path(each.path, folder), each.reason] for each in self.failures],
             **self.model.to_header(),
         }
-        write_container(path, "codes", header, {"vectors": self.vectors, **self.model.to_arrays("model.")})
+        arrays: dict[str, NDArray[Any]] = {"vectors": self.vectors, "volumes": self.volumes}
+        write_container(path, "codes", header, arrays | self.model.to_arrays("model."))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -170,7 +182,8 @@ class Codes:
             paths = tuple(found_path(each, folder) for each in stored)
             failures = tuple(Failure(found_path(each, folder), reason) for each, reason in header["failures"])
             _check_contents(arrays["vectors"], (*names, *stored, *hashes))
-            return cls(names, paths, hashes, arrays["vectors"], model, failures)
+            volumes = np.asarray(arrays.get("volumes", ()), np.float64)
+            return cls(names, paths, hashes, arrays["vectors"], model, failures, volumes)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             msg = f"{path}: not whole codes ({error}); make it again"
             raise ReadError(msg) from error

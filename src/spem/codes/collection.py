@@ -243,7 +243,7 @@ def _entries(
             entries.append(Entry(suffix, one_line(error)))
             continue
         arrays = bands if model is None else (model.encode(bands, shape.name),)
-        entries.append(Entry(suffix, ndim=shape.ndim, arrays=arrays))
+        entries.append(Entry(suffix, ndim=shape.ndim, arrays=arrays, volume=shape.volume))
     return entries
 
 
@@ -297,7 +297,7 @@ def _assemble(
     listing: Listing, folder: Work, reused: dict[str, list[Entry]], model: Model, progress: Progress
 ) -> Codes:
     """Make the code of every shape, in the order of the sources."""
-    names, paths, hashes, vectors = [], [], [], []
+    names, paths, hashes, vectors, volumes = [], [], [], [], []
     coded = dict(reused)
     for done, (source, key) in enumerate(listing, 1):
         if key is None or listing.fails_again(key, source):
@@ -312,10 +312,12 @@ def _assemble(
             paths.append(source_path(source))
             hashes.append(key)
             vectors.append(entry.arrays[0])
+            volumes.append(entry.volume)
         progress("codes", done, len(listing.sources))
     if not vectors:
         raise _nothing(listing)
-    return Codes(tuple(names), tuple(paths), tuple(hashes), np.stack(vectors), model, tuple(listing.failures))
+    identity = tuple(names), tuple(paths), tuple(hashes)
+    return Codes(*identity, np.stack(vectors), model, tuple(listing.failures), np.array(volumes))
 
 
 def _label_reason(entry: Entry) -> str:
@@ -343,10 +345,12 @@ def _reusable(known: Codes | None) -> dict[str, list[Entry]]:
         return {}
     first: dict[str, str] = {}
     rows: dict[str, list[Entry]] = {}
-    for name, path, key, vector in zip(known.names, known.paths, known.hashes, known.vectors, strict=True):
+    columns = known.names, known.paths, known.hashes, known.vectors, known.volumes.tolist()
+    for name, path, key, vector, volume in zip(*columns, strict=True):
         if first.setdefault(key, path) == path:
             suffix = name.removeprefix(source_name(Path(path)))
-            rows.setdefault(key, []).append(Entry(suffix, ndim=known.model.ndim or 0, arrays=(vector,)))
+            entry = Entry(suffix, ndim=known.model.ndim or 0, arrays=(vector,), volume=volume)
+            rows.setdefault(key, []).append(entry)
     return rows
 
 

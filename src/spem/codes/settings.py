@@ -22,7 +22,7 @@ CODE_FORMAT = 1
 
 Components = Literal["largest", "all"]
 # Settings that came later, and what files from before them mean.
-_ADDED: dict[str, Any] = {"features": "spem", "n_pairs": 100, "levels": 1}
+_ADDED: dict[str, Any] = {"features": "spem", "n_pairs": 100, "levels": 1, "per_label": None}
 _CHOICES = {
     "boundary": Boundary,
     "scheme": Scheme,
@@ -37,10 +37,10 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     # k-means takes seeds of 32 bits.
     "seed": partial(whole_number, least=0, largest=2**32 - 1),
     **dict.fromkeys(("threshold", "power"), finite_number),
-    **dict.fromkeys(("dark", "centred", "drop_boundary"), truth_value),
+    **dict.fromkeys(("dark", "per_label", "centred", "drop_boundary"), truth_value),
 }
 # Settings that may be None: no value, or, of settings for several kinds, the default of each.
-_OPTIONAL = ("voxels", "threshold", "dark", "n_centers", *DEFAULTED)
+_OPTIONAL = ("voxels", "threshold", "dark", "per_label", "n_centers", *DEFAULTED)
 # Filled with the default of a kind where there is one; settings for several leave it to their parts.
 _EACH_OWN: Any = None
 # What a file says about itself.
@@ -60,6 +60,9 @@ class Settings:
         Grey level of the surface, of images and grey volumes; found for each where None.
     dark
         Whether shapes are darker than the background, of images; found for each where None.
+    per_label
+        Whether every whole number but 0 of a volume is an object of its own, or all of them are one shape;
+        where None those of volumes that look like labels are, see `spem.read_all`.
     components
         Whether the largest component of a shape is kept or all.
     features
@@ -113,6 +116,7 @@ class Settings:
     voxels: int | None = DEFAULT_VOXELS
     threshold: float | None = None
     dark: bool | None = None
+    per_label: bool | None = None
     components: Components = "largest"
     features: str = AUTO
     boundary: Boundary = "surface"
@@ -152,6 +156,9 @@ class Settings:
             raise ParameterError(msg)
         if not 0 <= (self.power or 0.0) <= 1:
             msg = f"power={self.power} must lie in [0, 1]; the paper has 0.25"
+            raise ParameterError(msg)
+        if self.per_label and self.threshold is not None:
+            msg = f"per_label: labels have no threshold, but threshold={self.threshold}; give one of them"
             raise ParameterError(msg)
         words = self.features.split("+")
         if set(words) <= set(TRAITS):

@@ -167,7 +167,7 @@ def read_shapes(source: Source, settings: Settings) -> Iterator[tuple[str, Shape
     source
         A file or a shape.
     settings
-        Number of voxels, threshold, polarity and components.
+        Number of voxels, threshold, polarity, labels and components.
 
     Yields
     ------
@@ -188,10 +188,11 @@ def read_shapes(source: Source, settings: Settings) -> Iterator[tuple[str, Shape
     25
     """
     name = source_name(source)
-    if isinstance(source, Path) and settings.threshold is None and is_volume(source):
+    several = settings.threshold is None and settings.per_label is not False
+    if isinstance(source, Path) and several and is_volume(source):
         from spem.shapes.volumes import read_labels
 
-        for found in read_labels(source, name=name):
+        for found in read_labels(source, per_label=settings.per_label, name=name):
             yield found.name.removeprefix(name), _resampled(found, settings)
         return
     if isinstance(source, Shape):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from spem.errors import ParameterError, SpemError
 _KIND = "work"
 _SUFFIX = ".work"
 # Raised when the layout of these files changes.
-_LAYOUT = 2
+_LAYOUT = 3
 # Length of the digest that a folder of work is named by.
 _DIGITS, _HEX = 12, set("0123456789abcdef")
 # Settings that change codes but not the features that they are made of.
@@ -41,12 +42,15 @@ class Entry:
         Dimension of the shape; 0 where there is nothing.
     arrays
         Node features of each band ``(n_nodes, n_maps)``, or one code ``(n_code,)``.
+    volume
+        Volume of the shape, in the unit of its file to the power of its dimension; nan where it is not known.
     """
 
     suffix: str
     reason: str = ""
     ndim: int = 0
     arrays: tuple[NDArray[Any], ...] = ()
+    volume: float = math.nan
 
 
 def dimension(entries: Iterable[Entry]) -> int:
@@ -109,6 +113,7 @@ class Work:
         """Write what a source came to, in one step."""
         header = {"shapes": [[e.suffix, e.reason, e.ndim, len(e.arrays)] for e in entries]}
         arrays = {f"{i}.{j}": a for i, entry in enumerate(entries) for j, a in enumerate(entry.arrays)}
+        arrays["volumes"] = np.array([entry.volume for entry in entries])
         write_container(self.folder / f"{key}{_SUFFIX}", _KIND, header, arrays)
 
     def load(self, key: str) -> list[Entry]:
@@ -120,8 +125,11 @@ class Work:
             When it is not there, or damaged.
         """
         header, arrays = read_container(self.folder / f"{key}{_SUFFIX}", _KIND)
+        volumes = arrays["volumes"].tolist()
         return [
-            Entry(suffix, reason, ndim, tuple(np.asarray(arrays[f"{i}.{j}"]) for j in range(count)))
+            Entry(
+                suffix, reason, ndim, tuple(np.asarray(arrays[f"{i}.{j}"]) for j in range(count)), volumes[i]
+            )
             for i, (suffix, reason, ndim, count) in enumerate(header["shapes"])
         ]
 

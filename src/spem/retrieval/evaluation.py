@@ -93,7 +93,9 @@ class PrecisionRecall:
     skipped: tuple[int, ...]
 
 
-def evaluate(distances: ArrayLike, labels: Sequence[Hashable]) -> Scores:
+def evaluate(
+    distances: ArrayLike, labels: Sequence[Hashable], *, candidates: ArrayLike | None = None
+) -> Scores:
     """Score the ranking that distances give, each shape being a query in turn.
 
     A query has n - 1 answers, so with fewer than 33 shapes E is of all of these rather than of 32.
@@ -104,6 +106,9 @@ def evaluate(distances: ArrayLike, labels: Sequence[Hashable]) -> Scores:
         ``(n, n)`` distances, queries along the rows; the diagonal is not looked at.
     labels
         ``(n,)`` class of each shape.
+    candidates
+        ``(n, n)`` which shapes may answer each query, such as those of its size; all others by default. What
+        is to be found are the candidates of its class.
 
     Returns
     -------
@@ -123,7 +128,7 @@ def evaluate(distances: ArrayLike, labels: Sequence[Hashable]) -> Scores:
     >>> scores.mean()["NN"], scores.skipped
     (100.0, (2,))
     """
-    relevant, total, skipped = _relevance(distances, labels)
+    relevant, total, skipped = _relevance(distances, labels, candidates)
     n, answers = relevant.shape
     hits = relevant.cumsum(axis=1)
     rows, wanted = np.arange(n), np.maximum(total, 1)
@@ -243,7 +248,7 @@ def _bulls_eye(relevant: NDArray[np.bool_], total: NDArray[np.int64], skipped: t
 
 
 def _relevance(
-    distances: ArrayLike, labels: Sequence[Hashable]
+    distances: ArrayLike, labels: Sequence[Hashable], candidates: ArrayLike | None = None
 ) -> tuple[NDArray[np.bool_], NDArray[np.int64], tuple[int, ...]]:
     """Return which ranked answers are relevant ``(n, n - 1)``, how many there are, and lone queries."""
     ranked = np.array(distances, float)
@@ -257,11 +262,20 @@ def _relevance(
         raise ParameterError(msg)
     number = {label: i for i, label in enumerate(dict.fromkeys(labels))}
     code = np.array([number[label] for label in labels], np.int64)
-    total = np.bincount(code, minlength=1)[code] - 1
+    alike = code == code[:, None]
+    if candidates is not None:
+        allowed = np.asarray(candidates, bool)
+        if allowed.shape != (n, n):
+            msg = f"candidates of shape {allowed.shape} do not fit {n} labels; expected {(n, n)}"
+            raise ParameterError(msg)
+        alike, ranked = alike & allowed, np.where(allowed, ranked, np.inf)
+    total = alike.sum(axis=1) - alike.diagonal()
     if not total.any():
-        msg = f"none of the {len(number)} classes has two shapes, so no query has an answer; check the labels"
-        raise LabelError(msg)
-    return code[rank_others(ranked)] == code[:, None], total, tuple(np.flatnonzero(total == 0).tolist())
+        among = "" if candidates is None else " among the candidates of one of them"
+        msg = f"none of the {len(number)} classes has two shapes{among}, so no query has an answer; "
+        raise LabelError(msg + "check the labels")
+    order = rank_others(ranked)
+    return np.take_along_axis(alike, order, axis=1), total, tuple(np.flatnonzero(total == 0).tolist())
 
 
 def _members(labels: Sequence[Hashable], skipped: tuple[int, ...]) -> dict[Hashable, NDArray[np.int64]]:

@@ -84,18 +84,22 @@ def read_volume(
 def read_labels(
     path: str | Path,
     *,
+    per_label: bool | None = None,
     spacing: float | tuple[float, ...] | None = None,
     memory_limit: int | None = None,
     name: str | None = None,
 ) -> list[Shape]:
     """Read one shape for each non-zero label of a label volume, named "<name>-<label>".
 
-    A volume that is a mask or a grey volume gives one shape, under its own name.
+    A volume that is a mask or a grey volume gives one shape, under its own name, unless `per_label` says that
+    its values are labels.
 
     Parameters
     ----------
     path, spacing, memory_limit, name
         As `read_volume`.
+    per_label
+        Whether the values are labels, whatever they look like; told by `volume_shape`'s rule where None.
 
     Raises
     ------
@@ -115,8 +119,10 @@ def read_labels(
     stack = stack.with_spacing(spacing, name)
     refuse_non_finite(stack.array, name)
     kind, values = _kind(stack.array)
-    if kind != "labels":
+    if kind != "labels" and not per_label:
         return [_shape(stack, None, None, None, name)]
+    if per_label:
+        values = _labels(stack.array, name)
     found = values[values != 0]
     dense = np.searchsorted(found, stack.array) + 1
     dense[stack.array == 0] = 0
@@ -304,6 +310,17 @@ def _kind(array: NDArray[Any]) -> tuple[Literal["mask", "labels", "grey"], NDArr
     if values.size > _FEW_LABELS and np.mean(array[..., 1:] == array[..., :-1]) < 0.5:
         return grey
     return "labels", values
+
+
+def _labels(array: NDArray[Any], name: str) -> NDArray[Any]:
+    """Return the values of an array that are to be labels, in rising order; refuse what no label is."""
+    values = np.unique(array)
+    odd = values[(values < 0) | (values != np.rint(values))]
+    if odd.size or not values.any():
+        found = f"{odd[0]:g} among them" if odd.size else "nothing but 0"
+        msg = f"{name}: its values are no labels, {found}; expected whole numbers, 0 outside"
+        raise ShapeError(msg)
+    return values
 
 
 def _countable(array: NDArray[Any], high: Any) -> bool:
