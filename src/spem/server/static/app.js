@@ -1,0 +1,63 @@
+/** What every page has: routes, search by file, keys, and the line at the foot. */
+
+import { info } from "./api.js";
+import { element } from "./dom.js";
+import { renderGallery } from "./gallery.js";
+import { go, href, readState, route, start } from "./router.js";
+import { takeFiles } from "./upload.js";
+
+const asksForAnswers = (state) => Boolean(state.job || state.like);
+
+route("", "search", () => import("./search.js").then((module) => module.renderSearch), asksForAnswers);
+route("", "gallery", () => renderGallery);
+route("map", "map", () => import("./collection_map.js").then((module) => module.renderMap));
+route("shape/:id", "shape", async () => {
+  const { renderShape } = await import("./shape_page.js");
+  return (root, { id }, state, setState) => renderShape(root, id, state, setState);
+});
+
+function keys() {
+  document.addEventListener("keydown", (event) => {
+    if (event.key !== "/" || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.target.closest("input, textarea, select, dialog, [contenteditable]")) return;
+    event.preventDefault();
+    const box = document.getElementById("q");
+    if (box) box.focus();
+    else go(href("./")).then(() => document.getElementById("q")?.focus());
+  });
+}
+
+async function about() {
+  const place = document.getElementById("about");
+  try {
+    const { version, models, model } = await info();
+    place.replaceChildren(`spem ${version}`);
+    if (models.length > 1) place.append(modelChoice(models, model));
+  } catch {
+    place.replaceChildren(); // The page itself says what is wrong.
+  }
+}
+
+function modelChoice(models, chosen) {
+  const choose = (event) => {
+    const { q, label, ndim, sort } = readState();
+    const state = new URLSearchParams({ model: event.target.value });
+    for (const [key, value] of Object.entries({ q, label, ndim, sort })) if (value) state.set(key, value);
+    go(`${new URL(document.baseURI).pathname}?${state}`).then(about);
+  };
+  const options = models.map(({ digest, features, ndim, n_shapes }) => {
+    const words = [ndim ? `${ndim}-D` : "", [].concat(features).join(", "), n_shapes.toLocaleString("en")];
+    return element("option", { value: digest, selected: digest === chosen }, words.filter(Boolean).join(" · "));
+  });
+  return element(
+    "label",
+    { class: "field inline" },
+    element("span", {}, "Model"),
+    element("select", { onchange: choose }, ...options),
+  );
+}
+
+takeFiles();
+keys();
+start();
+about();
