@@ -44,7 +44,9 @@ if TYPE_CHECKING:
         LabelError,
         ModelError,
         ParameterError,
+        QueueFullError,
         ReadError,
+        SandboxError,
         ShapeError,
         SizeError,
         SpemError,
@@ -73,11 +75,14 @@ if TYPE_CHECKING:
     from spem.fields.walks.killed import Walk, killed_walk
     from spem.fields.walks.paths import sample_paths
     from spem.fields.walks.transient import Transient, solve_transient
+    from spem.index.answers import Answers
+    from spem.index.index import Index
     from spem.retrieval.classification import Classification, linear_svm
     from spem.retrieval.diffusion import rerank
     from spem.retrieval.distances import correlation_distance, fuse
     from spem.retrieval.evaluation import PrecisionRecall, Scores, bulls_eye, precision_recall
     from spem.retrieval.ranking import Answer
+    from spem.retrieval.sizes import of_one_size, size_distance
     from spem.shapes import creatures, synthetic
     from spem.shapes.boundary_surface import boundary_surface
     from spem.shapes.landmarks import CreaturePoses, creature_poses
@@ -89,6 +94,7 @@ __version__ = "0.1.0"
 
 __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three lists
     "Answer",
+    "Answers",
     "BlockLanczos",
     "BoundaryResponse",
     "Classification",
@@ -104,6 +110,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "ExplicitIteration",
     "Failure",
     "Hyperfield",
+    "Index",
     "LabelError",
     "Maps",
     "MatchedParts",
@@ -114,8 +121,10 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "ParameterError",
     "Parts",
     "PrecisionRecall",
+    "QueueFullError",
     "ReadError",
     "Report",
+    "SandboxError",
     "Scores",
     "Settings",
     "Shape",
@@ -173,6 +182,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "nodal_domains",
     "nodal_thresholds",
     "node_correlation",
+    "of_one_size",
     "parts",
     "precision_recall",
     "read",
@@ -186,6 +196,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "shared_times",
     "shared_values",
     "signed_distance_shape",
+    "size_distance",
     "solve_spectrum",
     "solve_surface_spectrum",
     "solve_transient",
@@ -209,6 +220,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
 # Public name -> module that defines it; each is imported when it is first used.
 _HOME = {
     "Answer": "spem.retrieval.ranking",
+    "Answers": "spem.index.answers",
     "BlockLanczos": "spem.fields.solvers.lanczos",
     "BoundaryResponse": "spem.embedding.boundary_response",
     "Classification": "spem.retrieval.classification",
@@ -224,6 +236,7 @@ _HOME = {
     "ExplicitIteration": "spem.fields.solvers.explicit",
     "Failure": "spem.codes.codes",
     "Hyperfield": "spem.fields.hyperfield",
+    "Index": "spem.index.index",
     "LabelError": "spem.errors",
     "Maps": "spem.embedding.maps",
     "MatchedParts": "spem.decomposition.matched",
@@ -234,8 +247,10 @@ _HOME = {
     "ParameterError": "spem.errors",
     "Parts": "spem.decomposition.parts",
     "PrecisionRecall": "spem.retrieval.evaluation",
+    "QueueFullError": "spem.errors",
     "ReadError": "spem.errors",
     "Report": "spem.shapes.shape",
+    "SandboxError": "spem.errors",
     "Scores": "spem.retrieval.evaluation",
     "Settings": "spem.codes.settings",
     "Shape": "spem.shapes.shape",
@@ -293,6 +308,7 @@ _HOME = {
     "nodal_domains": "spem.embedding.nodal",
     "nodal_thresholds": "spem.embedding.nodal",
     "node_correlation": "spem.decomposition.interactions",
+    "of_one_size": "spem.retrieval.sizes",
     "parts": "spem.api.parts",
     "precision_recall": "spem.retrieval.evaluation",
     "read": "spem.shapes.read",
@@ -306,6 +322,7 @@ _HOME = {
     "shared_times": "spem.embedding.signatures",
     "shared_values": "spem.embedding.signatures",
     "signed_distance_shape": "spem.shapes.levels",
+    "size_distance": "spem.retrieval.sizes",
     "solve_spectrum": "spem.fields.spectrum",
     "solve_surface_spectrum": "spem.fields.surface_spectrum",
     "solve_transient": "spem.fields.walks.transient",

@@ -8,6 +8,8 @@
     ├── LabelError          labels that do not fit the shapes they label
     ├── ModelError          codes, a vocabulary or a query that do not belong together
     ├── MissingExtraError   a package of an extra that is not installed
+    ├── SandboxError        a task of the server that was stopped: too long, too large, dead, cancelled
+    ├── QueueFullError      a task that the server has no room for now
     └── ConvergenceError    an iteration that missed its tolerance; carries the best iterate
 
 Each message is one line: what is wrong, where, what was expected, what to do.
@@ -76,6 +78,30 @@ class ModelError(SpemError):
 
 class MissingExtraError(SpemError):
     """A package that only an extra needs, and that is not installed."""
+
+
+class SandboxError(SpemError):
+    """A task on an untrusted file that was stopped, with the process that it ran in.
+
+    Parameters
+    ----------
+    message
+        One line: which task, why it was stopped, what to do.
+    reason
+        ``"time"``, ``"memory"``, ``"died"`` (its process crashed), ``"cancelled"``, ``"closed"`` (the server
+        is going down) or ``"unexpected"`` (an error that no reader should raise).
+    detail
+        More for the log of the server, never for a client.
+    """
+
+    def __init__(self, message: str, reason: str = "died", detail: str = "") -> None:
+        super().__init__(message)
+        self.reason = reason
+        self.detail = detail
+
+
+class QueueFullError(SpemError):
+    """A task that is refused because too many wait; try again later."""
 
 
 class ConvergenceError(SpemError):

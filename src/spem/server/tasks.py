@@ -1,0 +1,167 @@
+"""What worker processes do with untrusted files and with the shapes made of them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Mapping
+from contextvars import ContextVar
+from dataclasses import replace
+from datetime import datetime
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.codes.model import Model
+from spem.codes.sources import read_shapes, source_name
+from spem.errors import ModelError, ShapeError, SpemError
+from spem.index.encoding import row_of
+from spem.index.row import Row, unpack
+from spem.server.uploads import check_content, check_members, safe_name, upload_suffix
+
+Reply: TypeAlias = tuple[dict[str, Any], dict[str, NDArray[Any]]]
+Task: TypeAlias = Callable[[dict[str, Any], bytes], Reply]
+
+# Called with a stage and the share of the task that is done when it begins.
+listener: ContextVar[Callable[[str, float], None]] = ContextVar("listener", default=lambda *_: None)
+# What readers hold at most for one voxel or pixel.
+_BYTES_PER_VOXEL = 28
+_MOST_LABELS = 256
+_TEXT = ("id", "hash", "name", "path", "label", "ndim", "n_nodes", "volume")
+
+
+def encode(header: dict[str, Any], payload: bytes) -> Reply:
+    """Read an uploaded file and make the rows of its shapes.
+
+    Parameters
+    ----------
+    header
+        ``name`` of the upload and ``model_file``, where the model lies; it may have ``title``, the name for
+        people, ``voxels``, the most cells that a grid or a picture may have, and ``expanded``, the most bytes
+        that a packed volume may expand to.
+    payload
+        The bytes of the file.
+
+    Raises
+    ------
+    SpemError
+        When it is an archive, cannot be read, or has a shape that cannot be coded.
+    """
+    name, suffix = str(header["name"]), upload_suffix(str(header["name"]))
+    shown, most = safe_name(name), int(header.get("expanded", 1 << 30))
+    check_content(name, payload, most)
+    # in the folder of the task, under a name of ours: nothing of the client's reaches the file system
+    file = Path("upload" + suffix)
+    file.write_bytes(payload)
+    try:
+        if suffix == ".npz":
+            check_members(file, shown, most)
+        rows = _rows(file, _model(header["model_file"]), shown, header)
+    except SpemError as error:
+        raise type(error)(str(error).replace(str(file), shown)) from error
+    return pack_rows(rows)
+
+
+def view(header: dict[str, Any], payload: bytes) -> Reply:
+    """Compute a view of a packed shape: ``view`` of the header names it, the rest are its options."""
+    from spem.server.views import VIEWS
+
+    options = {key: value for key, value in header.items() if key != "view"}
+    return VIEWS[header["view"]](unpack(payload, str(header.get("name", "shape"))), options)
+
+
+def pack_rows(rows: list[Row]) -> Reply:
+    """Return rows as a header and arrays."""
+    listed, arrays = [], {}
+    for number, row in enumerate(rows):
+        listed.append(
+            {name: getattr(row, name) for name in _TEXT}
+            | {
+                "copies": list(row.copies),
+                "metadata": dict(row.metadata),
+                "report": _plain(row.report),
+                "added": row.added.isoformat(),
+            }
+        )
+        arrays[f"code-{number}"] = np.asarray(row.code, np.float32)
+        arrays[f"thumbnail-{number}"] = np.frombuffer(row.thumbnail, np.uint8)
+        arrays[f"shape-{number}"] = np.frombuffer(row.shape, np.uint8)
+    return {"rows": listed}, arrays
+
+
+def unpack_rows(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> list[Row]:
+    """Return the rows that `pack_rows` made this of.
+
+    Examples
+    --------
+    >>> row = Row("ab-1", "ab", "hand", "hand.png", np.ones(3, np.float32), ndim=2, shape=b"packed")
+    >>> [again] = unpack_rows(*pack_rows([row]))
+    >>> again.id, again.code.tolist(), again.shape
+    ('ab-1', [1.0, 1.0, 1.0], b'packed')
+    """
+    rows = []
+    for number, record in enumerate(header["rows"]):
+        rest: dict[str, Any] = {
+            "copies": tuple(record["copies"]),
+            "added": datetime.fromisoformat(record["added"]),
+            "code": arrays[f"code-{number}"],
+            "thumbnail": arrays[f"thumbnail-{number}"].tobytes(),
+            "shape": arrays[f"shape-{number}"].tobytes(),
+        }
+        rows.append(Row(**{**record, **rest}))
+    return rows
+
+
+#: What a worker can do, by name.
+TASKS: Mapping[str, Task] = {"encode": encode, "view": view}
+
+
+def _rows(file: Path, model: Model, shown: str, header: Mapping[str, Any]) -> list[Row]:
+    """Read the shapes of a file and code them."""
+    _limit_voxels(header.get("voxels"))
+    key = hashlib.sha256(file.read_bytes()).hexdigest()
+    title = str(header.get("title") or source_name(Path(shown)))
+    tell = listener.get()
+    tell("reading", 0.1)
+    found = []
+    for suffix, shape in read_shapes(file, model.settings):
+        if isinstance(shape, SpemError):
+            raise shape
+        found.append((suffix, shape))
+        if len(found) > _MOST_LABELS:
+            msg = f"{shown}: holds more than {_MOST_LABELS} labels; send fewer at a time"
+            raise ShapeError(msg)
+    rows = []
+    for done, (suffix, shape) in enumerate(found):
+        tell("coding", 0.3 + 0.7 * done / len(found))
+        rows.append(row_of(shape, model, key, suffix, title + suffix, shown))
+    return [replace(row, report={**row.report, "source": shown}) for row in rows]
+
+
+def _limit_voxels(voxels: int | None) -> None:
+    """Set the memory limit of the readers to so many voxels."""
+    if voxels is None:
+        os.environ.pop("SPEM_MEMORY_LIMIT", None)
+    else:
+        os.environ["SPEM_MEMORY_LIMIT"] = str(_BYTES_PER_VOXEL * voxels)
+
+
+@lru_cache(maxsize=4)
+def _model(path: str) -> Model:
+    """Load a model once in a process; its file is named by its digest and never changes."""
+    if not Path(path).is_file():
+        msg = "the model of this index is gone from the server's folder; start the server again"
+        raise ModelError(msg)
+    return Model.load(path)
+
+
+def _plain(value: Any) -> Any:
+    """Return a report as JSON has it."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(inner) for inner in value]
+    return value if isinstance(value, (str, int, float, bool, type(None))) else str(value)
