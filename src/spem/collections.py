@@ -21,6 +21,7 @@ from spem.retrieval.evaluation import Scores
 from spem.retrieval.evaluation import evaluate as evaluate_distances
 from spem.retrieval.labels import labelled, match_labels, read_labels
 from spem.retrieval.ranking import Answer, rank
+from spem.retrieval.sizes import of_one_size
 from spem.shapes.shape import Shape
 
 
@@ -123,6 +124,7 @@ def evaluate(
     codes: Codes | ArrayLike | str | Path,
     labels: str | Path | Mapping[str, str] | Sequence[Hashable],
     *,
+    matched_size: float | None = None,
     ignore_unlabelled: bool = False,
 ) -> Scores:
     """Score a collection: each shape is a query in turn, those of its class are to be found.
@@ -135,6 +137,9 @@ def evaluate(
     labels
         A labels file, a mapping of files to labels, or one label for each row of the codes. The shapes of
         a label volume are looked up by their names, such as ``"teeth-3"``.
+    matched_size
+        Compare shapes of one size only: volumes at most this many times each other. What size alone would
+        score is told by ``spem.evaluate(spem.size_distance(codes.volumes), labels)``.
     ignore_unlabelled
         Leave out shapes that a file or mapping has no label for.
 
@@ -143,7 +148,7 @@ def evaluate(
     LabelError
         When a shape has no label, or no class has two shapes.
     ParameterError
-        When distances and labels do not fit.
+        When distances and labels do not fit, or sizes are to be matched that are not known.
 
     Examples
     --------
@@ -154,9 +159,14 @@ def evaluate(
     100.0
     """
     if not isinstance(codes, (Codes, str, Path)):
+        if matched_size is not None:
+            msg = "matched_size: distances have no sizes; give codes"
+            raise ParameterError(msg)
         return evaluate_distances(codes, _listed(labels, "distances"))
     collection, classes = _with_classes(codes, labels, ignore_unlabelled=ignore_unlabelled)
-    return evaluate_distances(correlation_distance(collection.vectors, collection.vectors), classes)
+    candidates = None if matched_size is None else of_one_size(collection.volumes, matched_size)
+    distances = correlation_distance(collection.vectors, collection.vectors)
+    return evaluate_distances(distances, classes, candidates=candidates)
 
 
 def classify(

@@ -184,6 +184,7 @@ def read_all(
     spacing: float | tuple[float, ...] | None = None,
     inner_radius: float | None = None,
     components: Literal["largest", "all"] = "largest",
+    per_label: bool | None = None,
     memory_limit: int | None = None,
     name: str | None = None,
 ) -> list[Shape]:
@@ -195,6 +196,9 @@ def read_all(
         The file.
     voxels, spacing, inner_radius, components, memory_limit, name
         As `read`; the shapes of labels are named "<name>-<label>".
+    per_label
+        Whether the values of a volume are labels, also where they look like a mask or grey levels; told from
+        the values where None, and where False all that are not zero are one shape.
 
     Raises
     ------
@@ -212,11 +216,11 @@ def read_all(
     _refuse_both(voxels, spacing, inner_radius)
     grid = _Grid(voxels=voxels, spacing=spacing, inner_radius=inner_radius, memory_limit=memory_limit)
     path = Path(path)
-    if not is_volume(path):
+    if not is_volume(path) or per_label is False:
         return [read(path, components=components, name=name, **grid)]
     from spem.shapes.volumes import read_labels
 
-    shapes = read_labels(path, memory_limit=memory_limit, name=name)
+    shapes = read_labels(path, per_label=per_label, memory_limit=memory_limit, name=name)
     return [_regrid(keep_components(shape, components), grid) for shape in shapes]
 
 
