@@ -1,0 +1,17 @@
+"""The views by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TypeAlias
+
+from spem.server.views.field import view_field
+from spem.server.views.geometry import view_geometry
+from spem.server.views.options import Options, Reply
+from spem.shapes.shape import Shape
+
+View: TypeAlias = Callable[[Shape, Options], Reply]
+
+#: What is shown of a shape: each takes it and options, and returns a header for JSON and arrays.
+VIEWS: Mapping[str, View] = MappingProxyType({"geometry": view_geometry, "field": view_field})
