@@ -24,6 +24,7 @@ from spem.cli.paper import paper
 from spem.cli.parts import parts
 from spem.cli.evaluate import evaluate
 from spem.cli.search import search
+from spem.cli.serve import serve
 from spem.errors import SizeError, SpemError
 
 DONE, PARTIAL, NOTHING, INTERRUPTED = 0, 1, 2, 130
@@ -159,7 +160,7 @@ def _refuse(message: str) -> None:
     raise typer.Exit(NOTHING) from None
 
 
-for _command in (info, field, maps, parts, encode, search, evaluate, demo, paper):
+for _command in (info, field, maps, parts, encode, search, evaluate, demo, paper, serve):
     app.command()(guarded(_command))
 
 
