@@ -19,7 +19,9 @@ _MIB = 1 << 20
 def serve(
     db: Annotated[str, typer.Argument(metavar="DB", help="Folder or address of an index.")],
     host: Annotated[str, typer.Option(help="Address to listen at.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes a free one.")] = 8321,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes a free one.")
+    ] = 8321,
     token_file: Annotated[
         Path | None, typer.Option(metavar="FILE", help="File with the token for writing. [SPEM_TOKEN]")
     ] = None,
@@ -34,9 +36,7 @@ def serve(
         typer.Option(metavar="ADDRESS", help="A proxy whose X-Forwarded-For is believed."),
     ] = None,
     root_path: Annotated[str, typer.Option(metavar="PATH", help="Path that a proxy strips.")] = "",
-    workers: Annotated[
-        int, typer.Option(min=1, max=256, help="Processes for uploads and views.")
-    ] = 1,
+    workers: Annotated[int, typer.Option(min=1, max=256, help="Processes for uploads and views.")] = 1,
     memory: Annotated[int, typer.Option(min=512, help="Memory of each of them, in MiB.")] = 4096,
     seconds: Annotated[float, typer.Option(min=1.0, help="Longest time of one task.")] = 120.0,
     upload: Annotated[int, typer.Option(min=1, help="Largest upload, in MiB.")] = 64,

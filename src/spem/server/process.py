@@ -1,0 +1,57 @@
+"""The process of a server: its socket, its signals, its end."""
+
+from __future__ import annotations
+
+import socket
+
+from spem.errors import ParameterError
+from spem.index.index import Index
+from spem.server.app import create_app
+from spem.server.logs import configure
+from spem.server.options import ServerOptions
+
+_KEEP_ALIVE = 30
+_CONNECTIONS = 1024
+
+
+def listen(options: ServerOptions) -> socket.socket:
+    """Open the socket that a server listens at.
+
+    Raises
+    ------
+    ParameterError
+        When the address cannot be had.
+    """
+    family = socket.AF_INET6 if ":" in options.host else socket.AF_INET
+    try:
+        return socket.create_server((options.host, options.port), family=family, backlog=512)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        msg = (
+            f"{options.host} port {options.port}: {reason.lower()}; give another --port, or 0 for a free one"
+        )
+        raise ParameterError(msg) from error
+
+
+def run(index: Index, options: ServerOptions, opened: socket.socket) -> None:
+    """Serve an index until SIGTERM or SIGINT.
+
+    The server then takes no more requests, finishes those it has, finishes its jobs or puts them back into
+    the queue, and ends its worker processes.
+    """
+    import uvicorn
+
+    config = uvicorn.Config(
+        create_app(index, options),
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,
+        ws="none",
+        limit_concurrency=_CONNECTIONS,
+        timeout_keep_alive=_KEEP_ALIVE,
+        timeout_graceful_shutdown=max(1, round(options.finish_seconds)),
+    )
+    configure()
+    with opened:
+        uvicorn.Server(config).run(sockets=[opened])

@@ -1,0 +1,90 @@
+"""Routes on the shapes of the index: lists, single ones, pictures, neighbours."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request
+from starlette.responses import Response
+
+from spem.server.queries import LONGEST_TEXT, Filters, Sort, parse_metadata
+from spem.server.refusals import Refusal
+from spem.server.replies import documented, documented_as, json_reply, kept_reply, tag_of
+from spem.server.routes_service import ModelName
+from spem.server.schemas import FullCard, Page, Ranking
+from spem.server.services import Live, Services
+
+router = APIRouter(prefix="/api/shapes", tags=["shapes"])
+_LARGEST_OFFSET = 10**9
+_MOST_DIMENSIONS = 16
+ShapeId = Annotated[str, Path(max_length=110, description="Id of a shape, or upload-JOB.")]
+Label = Annotated[str | None, Query(max_length=LONGEST_TEXT, description="The label.")]
+Dimension = Annotated[int | None, Query(ge=1, le=_MOST_DIMENSIONS, description="The dimension.")]
+Metadata = Annotated[list[str], Query(max_length=8, description="KEY:VALUE, all of which have to hold.")]
+
+
+@router.get("", summary="One page of shapes", responses=documented(Page, 404, 422))
+async def shapes(
+    live: Live,
+    q: Annotated[str, Query(max_length=LONGEST_TEXT, description="Part of the name.")] = "",
+    label: Label = None,
+    ndim: Dimension = None,
+    metadata: Metadata = [],  # noqa: B006
+    sort: Sort = "name",
+    offset: Annotated[int, Query(ge=0, le=_LARGEST_OFFSET)] = 0,
+    limit: Annotated[int, Query(ge=0, le=500)] = 48,
+    model: ModelName = None,
+) -> Response:
+    """List the shapes that pass all filters: by name, the latest or the largest first."""
+    filters = Filters(q, label or None, ndim, parse_metadata(metadata))
+    return json_reply(await live.reads.run(_page, live, model, filters, sort, offset, limit))
+
+
+def _page(
+    live: Services, model: str | None, filters: Filters, sort: Sort, offset: int, limit: int
+) -> dict[str, Any]:
+    """Return a page of cards."""
+    from spem.server.cards import card
+
+    total, rows = live.catalogue.page(live.catalogue.digest(model), filters, sort, offset, limit)
+    return {"total": total, "shapes": [card(row) for row in rows]}
+
+
+@router.get("/{id}", summary="One shape, with its report", responses=documented(FullCard, 404))
+async def shape(live: Live, id: ShapeId, model: ModelName = None) -> Response:  # noqa: A002
+    """Tell all that is known of a shape."""
+    return json_reply(await live.reads.run(lambda: live.catalogue.card(live.catalogue.digest(model), id)))
+
+
+@router.get(
+    "/{id}/thumbnail.png",
+    summary="Its picture",
+    responses=documented_as("image/png", "A small picture.", 404),
+)
+async def thumbnail(request: Request, live: Live, id: ShapeId, model: ModelName = None) -> Response:  # noqa: A002
+    """Answer with a picture of at most some hundred pixels."""
+    picture = await live.reads.run(lambda: live.catalogue.thumbnail(live.catalogue.digest(model), id))
+    if not picture:
+        raise Refusal(404, "no picture of a shape of this dimension")
+    return kept_reply(request, picture, "image/png", tag_of(picture))
+
+
+@router.get("/{id}/neighbours", summary="The shapes nearest to one", responses=documented(Ranking, 404, 422))
+async def neighbours(
+    live: Live,
+    id: ShapeId,  # noqa: A002
+    k: Annotated[int, Query(ge=1, le=1000, description="Number of answers.")] = 12,
+    label: Label = None,
+    ndim: Dimension = None,
+    metadata: Metadata = [],  # noqa: B006
+    rerank: Annotated[bool, Query(description="Rank again by diffusion.")] = False,
+    model: ModelName = None,
+) -> Response:
+    """Search by a shape of the index, or by an upload of the last hour; it finds itself first."""
+    where = Filters("", label or None, ndim, parse_metadata(metadata)).where()
+    options = {"rerank": True} if rerank else {}
+    return json_reply(
+        await live.reads.run(
+            lambda: live.catalogue.neighbours(live.catalogue.digest(model), id, k, where, options)
+        )
+    )
