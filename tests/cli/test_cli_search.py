@@ -115,6 +115,9 @@ def test_size_alone_is_a_control(spem: Spem, folder: Path, codes: Path) -> None:
     refused = spem(*options, "--matched-size", "0.5")
     assert refused.exit_code == 2
     assert "at least 1" in refused.stderr
+    page = spem(*options, "--matched-size", "1.6", "--report", codes.parent / "report")
+    assert page.exit_code == 2
+    assert "whole collection" in page.stderr
 
 
 def test_evaluate_classifies_when_asked(spem: Spem, folder: Path, codes: Path) -> None:

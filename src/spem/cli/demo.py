@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spem.cli.encode import encode_paths
+from spem.cli.evaluate import REPORT, print_scores, score, summary
 from spem.cli.options import Json
 from spem.cli.output import check_folder, print_json, print_table
-from spem.cli.evaluate import REPORT, print_scores, score, summary
 
 if TYPE_CHECKING:
     from spem.codes.codes import Codes

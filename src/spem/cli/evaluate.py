@@ -18,6 +18,7 @@ from spem.cli.output import (
     to_json,
     write_bytes,
 )
+from spem.errors import ParameterError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -87,6 +88,9 @@ def evaluate(
     if json is not None and not to_stdout:
         check_target(json)
     if report is not None:
+        if matched_size is not None:
+            msg = "--report is a page on the whole collection; leave out --matched-size or --report"
+            raise ParameterError(msg)
         check_folder(report)
     from spem.codes.workers import count_processes
     from spem.retrieval.distances import correlation_distance
@@ -96,7 +100,10 @@ def evaluate(
     distances = correlation_distance(collection.vectors, collection.vectors)
     candidates = None if matched_size is None else of_one_size(collection.volumes, matched_size)
     scores = score(distances, classes, candidates)
-    facts = summary(scores) | size_alone(collection, classes, candidates)
+    facts = summary(scores)
+    control = size_scores(collection, classes, candidates)
+    if control is not None:
+        facts["size_alone"] = {**control.mean(), "bulls_eye": control.bulls_eye}
     if matched_size is not None:
         facts["matched_size"] = matched_size
     if rerank:
@@ -114,6 +121,7 @@ def evaluate(
             scores,
             distances=distances,
             title=codes.stem,
+            size_alone=control,
             jobs=jobs or count_processes(len(collection)),
         )
         typer.echo(f"wrote {page}", err=to_stdout)
@@ -130,20 +138,18 @@ def after_diffusion(
     return {**scores.mean(), "bulls_eye": scores.bulls_eye}
 
 
-def size_alone(
+def size_scores(
     codes: Codes, classes: list[str], candidates: NDArray[np.bool_] | None = None
-) -> dict[str, Any]:
-    """Score a ranking by volume and nothing else; nothing where volumes are not known."""
-    from spem.errors import ParameterError
+) -> Scores | None:
+    """Score a ranking by volume and nothing else; None where volumes are not known."""
     from spem.retrieval.evaluation import evaluate as score_distances
     from spem.retrieval.sizes import size_distance
 
     try:
         distances = size_distance(codes.volumes)
     except ParameterError:
-        return {}
-    scores = score_distances(distances, classes, candidates=candidates)
-    return {"size_alone": {**scores.mean(), "bulls_eye": scores.bulls_eye}}
+        return None
+    return score_distances(distances, classes, candidates=candidates)
 
 
 def classification(codes: Codes, classes: list[str], n_train: int, repeats: int, seed: int) -> dict[str, Any]:

@@ -39,6 +39,7 @@ def write_collection_report(
     *,
     distances: NDArray[np.float64],
     title: str,
+    size_alone: Scores | None = None,
     jobs: int = 1,
 ) -> Path:
     """Write the report of a collection; files that are gone have no picture.
@@ -57,6 +58,8 @@ def write_collection_report(
         ``(n, n)`` distances between its shapes.
     title
         Heading of the page.
+    size_alone
+        Scores of a ranking by size, as a control.
     jobs
         Number of processes.
 
@@ -77,6 +80,7 @@ def write_collection_report(
         thumbnails=drawn,
         map_pictures=[_map_picture(codes, row) if row in shown else None for row in range(max(shown) + 1)],
         scores=scores,
+        size_alone=size_alone,
         curve=precision_recall(distances, classes),
         distances=distances,
         settings=codes.model.settings.to_json() | {"model": codes.model.digest},

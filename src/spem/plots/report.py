@@ -38,6 +38,7 @@ def write_report(
     labels: Sequence[Hashable] | None = None,
     map_pictures: Sequence[bytes | None] = (),
     scores: Scores | None = None,
+    size_alone: Scores | None = None,
     curve: PrecisionRecall | None = None,
     distances: ArrayLike | None = None,
     settings: Mapping[str, object] | None = None,
@@ -61,6 +62,8 @@ def write_report(
         Up to `n` PNG files, of the first shapes in order; None where there is none.
     scores, curve
         What `spem.retrieval` makes of the distances and labels.
+    size_alone
+        What it makes of the sizes of the shapes instead, as a control.
     distances
         ``(n, n)`` distances between shapes, for the queries answered worst and best.
     settings
@@ -93,7 +96,7 @@ def write_report(
     words = None if labels is None else [str(label) for label in labels]
     gallery = Gallery(names, words, thumbnails)
     body = [
-        scores_section(scores, curve),
+        scores_section(scores, curve, size_alone),
         queries_section(gallery, matrix),
         classes_section(scores, words),
         maps_section(gallery, map_pictures),

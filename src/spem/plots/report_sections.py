@@ -18,15 +18,19 @@ if TYPE_CHECKING:
 MAP_PICTURES = 24
 
 
-def scores_section(scores: Scores | None, curve: PrecisionRecall | None) -> str:
+def scores_section(
+    scores: Scores | None, curve: PrecisionRecall | None, size_alone: Scores | None = None
+) -> str:
     """Return the mean scores, each named once in words, and the precision-recall curve beside them.
+
+    What size alone would score stands below them, as a control.
 
     Examples
     --------
     >>> scores_section(None, None)
     ''
     """
-    cards = "" if scores is None else _cards(scores)
+    cards = "" if scores is None else _cards(scores, size_alone)
     picture = "" if curve is None else f'<figure class="curve">{curve_svg(curve)}</figure>'
     return section("Scores", f'<div class="scores">\n{cards}{picture}</div>' if cards or picture else "")
 
@@ -109,7 +113,7 @@ def _titled(gallery: Gallery, i: int) -> str:
     return f"class {text(gallery.labels[i])}<br><small>{text(gallery.names[i])}</small>"
 
 
-def _cards(scores: Scores) -> str:
+def _cards(scores: Scores, size_alone: Scores | None) -> str:
     """Mean scores and what they are called; the E of perfect answers beside E."""
     means = [(name, MEASURES.get(name, name), value) for name, value in scores.mean().items()]
     means.append(("BE", "bull's eye", scores.bulls_eye))
@@ -125,7 +129,15 @@ def _cards(scores: Scores) -> str:
         f"{words}. Perfect answers give 100 %, but for E, which looks at {E_ANSWERS} answers: with classes"
         f" of these sizes they give {most} %."
     )
-    return f'<div><dl class="cards">{cards}</dl>\n<p class="note">{legend}</p></div>\n'
+    control = "" if size_alone is None else f'\n<p class="note">{_control(size_alone)}</p>'
+    return f'<div><dl class="cards">{cards}</dl>\n<p class="note">{legend}</p>{control}</div>\n'
+
+
+def _control(scores: Scores) -> str:
+    """Say what a ranking by size alone scores."""
+    means = [*scores.mean().items(), ("BE", scores.bulls_eye)]
+    told = ", ".join(f"{text(name)} {number(value)}" for name, value in means)
+    return f"As a control: a ranking by the size of the shapes and nothing else gives {told}."
 
 
 def _largest_e(n_class: int, n_shapes: int) -> float:
