@@ -50,8 +50,8 @@ def serve(
 ) -> None:
     """Serve an index over HTTP, with its explorer.
 
-    Only this machine can reach it, and nobody can write, unless told otherwise. Requests are logged on stderr,
-    a line of JSON each. It stops on Ctrl-C or SIGTERM, and lets running jobs finish or puts them back.
+    Only this machine can reach it, and nobody can write, unless told otherwise. Requests are logged on
+    stderr, a line of JSON each. It stops on Ctrl-C or SIGTERM; running jobs finish or are put back.
 
     \b
     Examples:
@@ -65,7 +65,7 @@ def serve(
         require(module, "server")
     from spem.index.index import Index
     from spem.server.options import ServerOptions
-    from spem.server.process import listen, run
+    from spem.server.running import listen, run
 
     options = ServerOptions(
         host=host,

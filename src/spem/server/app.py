@@ -6,6 +6,7 @@ import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from http import HTTPStatus
+from typing import cast
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -94,20 +95,19 @@ def _names(options: ServerOptions) -> frozenset[str]:
 
 async def _on_refusal(_: Request, error: Exception) -> Response:
     """Answer a refusal."""
-    assert isinstance(error, Refusal)
-    return refused(error)
+    return refused(cast("Refusal", error))
 
 
 async def _on_http(_: Request, error: Exception) -> Response:
     """Answer what the router has to say, such as that there is no such page."""
-    assert isinstance(error, HTTPException)
-    return error_response(error.status_code, HTTPStatus(error.status_code).phrase.lower(), error.headers)
+    told = cast("HTTPException", error)
+    return error_response(told.status_code, HTTPStatus(told.status_code).phrase.lower(), told.headers)
 
 
 async def _on_values(_: Request, error: Exception) -> Response:
     """Answer values out of their range; what was sent is not repeated."""
-    assert isinstance(error, RequestValidationError)
-    told = "; ".join(f"{entry['loc'][-1]}: {entry['msg']}" for entry in error.errors()[:3])
+    entries = cast("RequestValidationError", error).errors()[:3]
+    told = "; ".join(f"{entry['loc'][-1]}: {entry['msg']}" for entry in entries)
     return error_response(422, told.replace("Input should be", "expected"))
 
 

@@ -12,11 +12,11 @@ from spem.server.refusals import plain
 
 
 def base_name(path: str) -> str:
-    """Return the last part of a path or address of any system.
+    r"""Return the last part of a path or address of any system.
 
     Examples
     --------
-    >>> base_name("C:\\\\scans\\\\cat.obj"), base_name("s3://shapes/cat.obj")
+    >>> base_name("C:\\scans\\cat.obj"), base_name("s3://shapes/cat.obj")
     ('cat.obj', 'cat.obj')
     """
     return path.replace("\\", "/").rstrip("/").rpartition("/")[2]

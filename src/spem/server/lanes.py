@@ -1,4 +1,4 @@
-"""Bounded pools of threads for what blocks, so that the event loop never waits and no queue grows for ever."""
+"""Bounded pools of threads for what blocks: the event loop never waits, and no queue grows for ever."""
 
 from __future__ import annotations
 

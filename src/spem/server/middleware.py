@@ -79,7 +79,7 @@ class Doorkeeper:
         if not length.isdigit() or int(length) > limit:
             raise too_large(limit)
         if scope["method"] == "HEAD":
-            scope = scope | {"method": "GET"} if scope["path"].startswith("/api") else scope
+            scope["method"] = "GET"
         await self._app(scope, counted(receive, limit), reply)
 
     def _write_down(self, scope: Scope, reply: _Reply, client: str, method: str) -> None:
@@ -116,10 +116,11 @@ class _Reply:
             headers: list[Any] = list(message.get("headers", ()))
             known = {name for name, _ in headers}
             headers += [pair for pair in HEADERS if pair[0] not in known]
-            message = message | {"headers": [*headers, (b"x-request-id", self.id.encode())]}
+            message["headers"] = [*headers, (b"x-request-id", self.id.encode())]
         elif message["type"] == "http.response.body":
             self.n_bytes += len(message.get("body", b""))
-            message = message | {"body": b""} if self._head else message
+            if self._head:
+                message["body"] = b""
         await self._send(message)
 
 

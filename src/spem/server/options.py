@@ -41,7 +41,8 @@ class ServerOptions:
     queue
         Number of jobs, and of requests for views, that may wait; more are told to come again.
     rate
-        Requests a second of one client, in the long run; 0 for any number. Four seconds' worth may come at once.
+        Requests a second of one client, in the long run; 0 for any number. Four seconds' worth may come
+        at once.
     view_bytes
         Memory for views that were computed before.
     finish_seconds

@@ -48,11 +48,11 @@ class Busy(Refusal):
 
 
 def plain(message: str) -> str:
-    """Return a message on one line, without the folders of the host.
+    r"""Return a message on one line, without the folders of the host.
 
     Examples
     --------
-    >>> plain("/srv/shapes/tmp1/cat.obj: no faces;\\n give a mesh")
+    >>> plain("/srv/shapes/tmp1/cat.obj: no faces;\n give a mesh")
     'cat.obj: no faces; give a mesh'
     """
     return _FOLDERS.sub("", " ".join(message.split()))[:_LONGEST]
