@@ -7,6 +7,7 @@
     ├── ParameterError      an argument out of its range (also a ValueError)
     ├── LabelError          labels that do not fit the shapes they label
     ├── ModelError          codes, a vocabulary or a query that do not belong together
+    ├── ClusterError        a cluster that cannot be reached, or does not fit
     ├── MissingExtraError   a package of an extra that is not installed
     ├── SandboxError        a task of the server that was stopped: too long, too large, dead, cancelled
     ├── QueueFullError      a task that the server has no room for now
@@ -76,6 +77,10 @@ class ModelError(SpemError):
     """Codes, a vocabulary or a query that were not made by the same model."""
 
 
+class ClusterError(SpemError):
+    """A cluster that cannot be reached, is lost, or whose workers would not do the same as here."""
+
+
 class MissingExtraError(SpemError):
     """A package that only an extra needs, and that is not installed."""
 
@@ -101,7 +106,19 @@ class SandboxError(SpemError):
 
 
 class QueueFullError(SpemError):
-    """A task that is refused because too many wait; try again later."""
+    """A task that is refused because too many wait.
+
+    Parameters
+    ----------
+    message
+        One line.
+    seconds
+        When to try again.
+    """
+
+    def __init__(self, message: str, seconds: float = 1.0) -> None:
+        super().__init__(message)
+        self.seconds = seconds
 
 
 class ConvergenceError(SpemError):
