@@ -116,6 +116,29 @@ def match_labels(names: Sequence[str | Path], labels: Mapping[str, str]) -> list
     return [labels[key] for key in keys if key is not None]
 
 
+def find_labels(names: Sequence[str | Path], labels: Mapping[str, str]) -> list[str]:
+    """Return the label of every shape, as `match_labels` finds them, and nothing where there is none.
+
+    Parameters
+    ----------
+    names
+        ``(n,)`` paths, file names or names of the shapes.
+    labels
+        File → label, as `read_labels` gives them.
+
+    Raises
+    ------
+    LabelError
+        If more than one label could be meant.
+
+    Examples
+    --------
+    >>> find_labels(["rex.png", "tom.png"], {"tom": "cat"})
+    ['', 'cat']
+    """
+    return ["" if key is None else labels[key] for key in _resolve(names, labels)]
+
+
 def labelled(names: Sequence[str | Path], labels: Mapping[str, str]) -> list[int]:
     """Return the places, among the shapes, of those that have a label.
 

@@ -1,0 +1,235 @@
+"""Sources encoded on a Dask cluster: what local processes do, by workers that see the same files."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from spem.codes.workers import one_line
+from spem.errors import ClusterError
+from spem.index.encoding import Item
+from spem.index.extra import require
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+# Seconds within which a scheduler must answer, and for which one may have no worker.
+CONNECT, IDLE = 8.0, 60.0
+# Tasks handed out for each thread: one runs, the next is there when it is done.
+_AHEAD = 2
+# Seconds between two looks at the cluster while nothing comes.
+_LOOK = 1.0
+
+
+@dataclass(frozen=True)
+class ClusterExecutor:
+    """Runs tasks on the workers of a Dask cluster, one thread each.
+
+    A worker that dies costs no task: the scheduler gives what it had to others, and a task that took several
+    down is tried again alone. Results do not depend on where they are made.
+
+    Parameters
+    ----------
+    address
+        Of the scheduler: ``"tcp://host:8786"``, or ``"tls://host:8786"`` with the certificates that the
+        configuration of Dask names.
+    retries
+        How often a task whose workers died is tried again, alone.
+    idle
+        Seconds without any worker after which the cluster is given up.
+    """
+
+    address: str
+    retries: int = 2
+    idle: float = IDLE
+
+    def run(self, work: Callable[[T], R], tasks: Sequence[T]) -> Iterator[tuple[T, R | None, str]]:
+        """Yield each task with its result, or None and one line why there is none, as they come.
+
+        Raises
+        ------
+        ClusterError
+            When the cluster cannot be reached, has another version of spem or Python, cannot see the files,
+            or is lost.
+        MissingExtraError
+            When Dask's scheduler is not installed.
+        """
+        if not tasks:
+            return
+        distributed = require("distributed", "cluster")
+        with _connected(distributed, self.address) as client:
+            _check_workers(client, self.address, tasks)
+            stamp = _stamp()
+            shared = client.submit(_itself, work, pure=False)
+            run = _Run(distributed, client, self.address, self.idle, (stamp, shared))
+            suspects = []
+            for task, outcome in run.outcomes(tasks, alone=False):
+                if outcome is None:
+                    suspects.append(task)
+                else:
+                    yield task, *outcome
+            for task in suspects:
+                yield task, *self._alone(run, task)
+
+    def _alone(self, run: _Run, task: Any) -> tuple[Any, str]:
+        """Run a task with nothing beside it, as often as it may be tried."""
+        for _ in range(self.retries):
+            [(_, outcome)] = run.outcomes([task], alone=True)
+            if outcome is not None:
+                return outcome
+        return None, "its worker died each time, perhaps for want of memory"
+
+
+@dataclass(frozen=True)
+class _Run:
+    """Tasks on their way to a cluster and back."""
+
+    distributed: Any
+    client: Any
+    address: str
+    idle: float
+    shared: tuple[Any, ...]
+
+    def outcomes(self, tasks: Sequence[Any], *, alone: bool) -> Iterator[tuple[Any, tuple[Any, str] | None]]:
+        """Yield each task with its outcome, None where its workers died; few are on their way at a time."""
+        left = iter(tasks)
+        pending: dict[Any, Any] = {}
+        more, since = True, time.monotonic()
+        try:
+            while more or pending:
+                n_threads = self._n_threads()
+                since = time.monotonic() if n_threads else since
+                while more and len(pending) < (1 if alone else max(2, _AHEAD * n_threads)):
+                    task = next(left, _END)
+                    more = task is not _END
+                    if more:
+                        pending[self._submit(task)] = task
+                for future in self._finished(pending):
+                    yield pending.pop(future), self._outcome(future)
+                if time.monotonic() - since > self.idle:
+                    msg = f"{self.address}: no worker for {self.idle:g} s; start some, give the command again"
+                    raise ClusterError(msg)
+        finally:
+            if pending:
+                self.client.cancel(list(pending), force=True)
+
+    def _submit(self, task: Any) -> Any:
+        """Hand a task out."""
+        return self.client.submit(_on_worker, *self.shared, _absolute(task), pure=False)
+
+    def _n_threads(self) -> int:
+        """Return how many tasks the workers run at once."""
+        try:
+            return sum(self.client.nthreads().values())
+        except (TimeoutError, OSError, RuntimeError, ValueError) as error:
+            msg = f"{self.address}: the scheduler is gone; what was written stays: give the command again"
+            raise ClusterError(msg) from error
+
+    def _finished(self, pending: dict[Any, Any]) -> list[Any]:
+        """Wait a little, and return what is done by then."""
+        if pending:
+            try:
+                self.distributed.wait(list(pending), timeout=_LOOK, return_when="FIRST_COMPLETED")
+            except TimeoutError:
+                return []
+        return [future for future in pending if future.status != "pending"]
+
+    def _outcome(self, future: Any) -> tuple[Any, str] | None:
+        """Return what a task came to."""
+        try:
+            result: tuple[Any, str] = future.result()
+        except self.distributed.KilledWorker:
+            return None
+        except Exception as error:  # noqa: BLE001
+            return None, one_line(error)
+        return result
+
+
+_END = object()
+
+
+@contextmanager
+def _connected(distributed: Any, address: str) -> Iterator[Any]:
+    """Connect to a scheduler."""
+    if not address.startswith(("tcp://", "tls://")):
+        msg = f"cluster {address}: expected the address of a Dask scheduler, such as tcp://host:8786"
+        raise ClusterError(msg)
+    try:
+        client = distributed.Client(address, timeout=CONNECT, set_as_default=False)
+    except (TimeoutError, OSError, ValueError, TypeError) as error:
+        msg = f"{address}: no Dask scheduler answers there; start one with: dask scheduler"
+        raise ClusterError(msg) from error
+    try:
+        yield client
+    finally:
+        client.close(timeout=CONNECT)
+
+
+def _check_workers(client: Any, address: str, tasks: Sequence[Any]) -> None:
+    """Refuse workers that would make other codes, or see other files."""
+    task = _absolute(tasks[0])
+    path = task.source if isinstance(task, Item) and isinstance(task.source, Path) else None
+    try:
+        found = client.run(_about, path)
+    except Exception as error:
+        msg = f"{address}: the workers lack spem {version('spem')} ({one_line(error)}); install it there"
+        raise ClusterError(msg) from error
+    if not found:
+        msg = f"{address}: the scheduler has no worker; start some with: dask worker {address} --nthreads 1"
+        raise ClusterError(msg)
+    here = _stamp()
+    for worker, (stamp, sees) in sorted(found.items()):
+        if stamp != here:
+            msg = f"{worker}: the worker has {stamp}, here is {here}; install the same on both"
+            raise ClusterError(msg)
+        if not sees:
+            msg = f"{worker}: cannot read {path}; workers need the same files, on shared storage"
+            raise ClusterError(msg)
+
+
+def _absolute(task: Any) -> Any:
+    """Name files by their whole path, since workers have working directories of their own."""
+    if isinstance(task, Item) and isinstance(task.source, Path):
+        return replace(task, source=task.source.absolute())
+    return task
+
+
+def _about(path: Path | None) -> tuple[str, bool]:
+    """Return, on a worker, the versions it has, and whether it sees a file."""
+    return _stamp(), path is None or path.is_file()
+
+
+def _stamp() -> str:
+    """Return the versions that have to agree."""
+    return f"spem {version('spem')} on Python {'.'.join(platform.python_version_tuple()[:2])}"
+
+
+def _itself(work: T) -> T:
+    """Return the argument: a task that others depend on is made again when the worker that had it dies."""
+    return work
+
+
+def _on_worker(stamp: str, work: Callable[[T], R], task: T) -> tuple[R | None, str]:
+    """Run one task; an error of any kind is a value, so that one bad file does not end the rest."""
+    if stamp != _stamp():
+        return None, f"a worker that joined later has {_stamp()}, not {stamp}; add the file again"
+    _one_thread()
+    try:
+        return work(task), ""
+    except Exception as error:  # noqa: BLE001
+        return None, one_line(error)
+
+
+@cache
+def _one_thread() -> None:
+    """Once in a worker: give numerical libraries one thread, for all tasks to come."""
+    threadpool_limits(1)

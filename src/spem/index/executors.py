@@ -1,0 +1,50 @@
+"""Where sources are encoded: in processes of this machine, or by whatever else runs tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+from spem.codes.workers import run_all
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class Executor(Protocol):
+    """Runs a function over tasks."""
+
+    def run(self, work: Callable[[T], R], tasks: Sequence[T]) -> Iterator[tuple[T, R | None, str]]:
+        """Yield each task with its result, or None and one line why there is none, as they come.
+
+        Parameters
+        ----------
+        work
+            Function or object of a module; it can be pickled.
+        tasks
+            Its arguments.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class LocalExecutor:
+    """Runs tasks in processes of this machine, one thread each.
+
+    Parameters
+    ----------
+    n_jobs
+        Number of processes; with 1 all runs in this one.
+
+    Examples
+    --------
+    >>> list(LocalExecutor().run(int, ["7", "x"]))[0]
+    ('7', 7, '')
+    """
+
+    n_jobs: int = 1
+
+    def run(self, work: Callable[[T], R], tasks: Sequence[T]) -> Iterator[tuple[T, R | None, str]]:
+        """Yield each task with its result; a process that dies costs no other task."""
+        return run_all(work, tasks, self.n_jobs)
