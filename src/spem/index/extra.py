@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import Any
 
 from spem.errors import MissingExtraError
+
+# The database writes warnings of its own to stderr; what matters is raised.
+_QUIET = {"LANCE_LOG": "error", "RUST_LOG": "error"}
 
 
 def require(module: str, extra: str = "index") -> Any:
@@ -28,6 +32,8 @@ def require(module: str, extra: str = "index") -> Any:
     >>> require("math").pi > 3
     True
     """
+    for name, value in _QUIET.items() if module == "lancedb" else ():
+        os.environ.setdefault(name, value)
     try:
         return import_module(module)
     except ImportError as error:

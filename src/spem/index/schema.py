@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spem.index.extra import require
 from spem.index.row import Row
@@ -14,6 +15,9 @@ from spem.index.row import Row
 if TYPE_CHECKING:
     import pyarrow
 
+# Raised when columns change their meaning; an index of a later layout is refused.
+LAYOUT = 1
+LAYOUT_KEY = b"spem.layout"
 # Columns that answers and lists need: everything but the heavy ones.
 LIGHT = (
     "id",
@@ -30,6 +34,9 @@ LIGHT = (
     "added",
 )
 HEAVY = ("vector", "thumbnail", "shape")
+# The database refuses a second row of the same key, whoever writes it at the same time.
+_KEY = {b"lance-schema:unenforced-primary-key": b"true"}
+_CODED = ("copies", "metadata", "report")
 
 
 def schema(n_code: int) -> pyarrow.Schema:
@@ -40,7 +47,7 @@ def schema(n_code: int) -> pyarrow.Schema:
     pa = require("pyarrow")
     return pa.schema(
         [
-            ("id", pa.string()),
+            pa.field("id", pa.string(), nullable=False, metadata=_KEY),
             ("hash", pa.string()),
             ("name", pa.string()),
             ("path", pa.string()),
@@ -55,29 +62,51 @@ def schema(n_code: int) -> pyarrow.Schema:
             ("vector", pa.list_(pa.float32(), n_code)),
             ("thumbnail", pa.large_binary()),
             ("shape", pa.large_binary()),
-        ]
+        ],
+        metadata={LAYOUT_KEY: str(LAYOUT).encode()},
     )
+
+
+def models_schema() -> pyarrow.Schema:
+    """Return the columns of the table of models."""
+    pa = require("pyarrow")
+    return pa.schema(
+        [
+            pa.field("digest", pa.string(), nullable=False, metadata=_KEY),
+            ("features", pa.string()),
+            ("ndim", pa.int32()),
+            ("n_code", pa.int32()),
+            ("made", pa.timestamp("us", tz="UTC")),
+            ("model", pa.large_binary()),
+        ],
+        metadata={LAYOUT_KEY: str(LAYOUT).encode()},
+    )
+
+
+def layout_of(columns: pyarrow.Schema) -> int | None:
+    """Return the number of the layout that a table has, None where it is no table of an index."""
+    found = (columns.metadata or {}).get(LAYOUT_KEY, b"")
+    return int(found) if found.isdigit() else None
 
 
 def to_table(rows: Sequence[Row], n_code: int) -> pyarrow.Table:
     """Return rows as a table."""
     pa = require("pyarrow")
-    codes = np.stack([row.code for row in rows]).astype(np.float64)
     columns: dict[str, Any] = {
         name: [getattr(row, name) for row in rows]
         for name in (*LIGHT, "thumbnail", "shape")
-        if name not in ("copies", "metadata", "report")
+        if name not in _CODED
     }
     columns["copies"] = [list(row.copies) for row in rows]
     columns["metadata"] = [sorted(row.metadata.items()) for row in rows]
     columns["report"] = [json.dumps(dict(row.report)) for row in rows]
-    flat = pa.array(standardised_codes(codes).ravel())
+    flat = pa.array(standardised_codes(np.stack([row.code for row in rows])).ravel())
     columns["vector"] = pa.FixedSizeListArray.from_arrays(flat, n_code)
     wanted = schema(n_code)
     return pa.table({name: columns[name] for name in wanted.names}, schema=wanted)
 
 
-def standardised_codes(codes: np.ndarray[Any, Any]) -> np.ndarray[Any, np.dtype[np.float32]]:
+def standardised_codes(codes: NDArray[Any]) -> NDArray[np.float32]:
     """Return ``(n, n_code)`` codes centred and of unit length, in float32; constant ones as zeros."""
     from spem.codes.joining import standardised
 
@@ -88,7 +117,7 @@ def to_row(record: Mapping[str, Any]) -> Row:
     """Return the row that a record of the table stands for; columns that it has not are left empty."""
     code = np.asarray(record.get("vector", ()), np.float32)
     return Row(
-        **{name: record[name] for name in LIGHT if name not in ("copies", "metadata", "report")},
+        **{name: record[name] for name in LIGHT if name not in _CODED},
         code=code,
         copies=tuple(record["copies"] or ()),
         metadata=dict(record["metadata"] or ()),
