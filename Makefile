@@ -45,17 +45,17 @@ $(STAMPS)/venv:
 	touch $@
 
 $(STAMPS)/spem: pyproject.toml $(STAMPS)/venv
-	$(BIN)/python -m pip install --quiet -e .
+	$(BIN)/python -m pip install --quiet -e '.[server]'
 	touch $@
 
 $(STAMPS)/test: $(STAMPS)/spem
-	$(BIN)/python -m pip install --quiet --group test -e '.[rivals]'
+	$(BIN)/python -m pip install --quiet --group test -e '.[rivals,cluster,server]'
 	touch $@
 
 $(STAMPS)/docs: $(STAMPS)/spem
-	$(BIN)/python -m pip install --quiet --group docs -e '.[rivals]'
+	$(BIN)/python -m pip install --quiet --group docs -e '.[rivals,cluster,server]'
 	touch $@
 
 $(STAMPS)/check: $(STAMPS)/spem
-	$(BIN)/python -m pip install --quiet --group check -e '.[rivals]'
+	$(BIN)/python -m pip install --quiet --group check -e '.[rivals,cluster,server]'
 	touch $@ $(STAMPS)/test $(STAMPS)/docs
