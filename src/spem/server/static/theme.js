@@ -6,7 +6,8 @@
 
   function stored() {
     try {
-      return localStorage.getItem(KEY);
+      const theme = localStorage.getItem(KEY);
+      return ["light", "dark"].includes(theme) ? theme : null;
     } catch {
       return null; // Storage is closed to pages in some private windows.
     }
@@ -20,25 +21,25 @@
     }
   }
 
-  const theme = () => root.dataset.theme ?? (dark.matches ? "dark" : "light");
-
-  function tell() {
+  function use(theme) {
+    root.dataset.theme = theme;
     const button = document.getElementById("theme");
-    button?.setAttribute("aria-label", theme() === "dark" ? "Use the light theme" : "Use the dark theme");
+    button?.setAttribute("aria-label", theme === "dark" ? "Use the light theme" : "Use the dark theme");
     button?.setAttribute("title", button.getAttribute("aria-label"));
     // Canvases take their colours anew.
-    dispatchEvent(new CustomEvent("spem-theme", { detail: theme() }));
+    dispatchEvent(new CustomEvent("spem-theme", { detail: theme }));
   }
 
-  const chosen = stored();
-  if (chosen === "light" || chosen === "dark") root.dataset.theme = chosen;
-  dark.addEventListener("change", tell);
+  const wished = () => stored() ?? (dark.matches ? "dark" : "light");
+
+  use(wished());
+  dark.addEventListener("change", () => use(wished()));
   document.addEventListener("DOMContentLoaded", () => {
-    tell();
+    use(wished());
     document.getElementById("theme").addEventListener("click", () => {
-      root.dataset.theme = theme() === "dark" ? "light" : "dark";
-      keep(root.dataset.theme);
-      tell();
+      const theme = root.dataset.theme === "dark" ? "light" : "dark";
+      keep(theme);
+      use(theme);
     });
   });
 })();
