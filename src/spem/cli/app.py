@@ -16,13 +16,14 @@ from typer.core import TyperGroup
 from spem import __version__
 from spem.cli.demo import demo
 from spem.cli.encode import encode
+from spem.cli.evaluate import evaluate
 from spem.cli.fields import field
+from spem.cli.index import COMMANDS, group
 from spem.cli.info import info
 from spem.cli.maps import maps
 from spem.cli.output import complain
 from spem.cli.paper import paper
 from spem.cli.parts import parts
-from spem.cli.evaluate import evaluate
 from spem.cli.search import search
 from spem.cli.serve import serve
 from spem.errors import SizeError, SpemError
@@ -162,6 +163,9 @@ def _refuse(message: str) -> None:
 
 for _command in (info, field, maps, parts, encode, search, evaluate, demo, paper, serve):
     app.command()(guarded(_command))
+for _name, _of_index in {**COMMANDS}.items():
+    group.command(_name)(guarded(_of_index))
+app.add_typer(group)
 
 
 def run() -> None:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
 from numpy.typing import NDArray
 
 from spem.codes.codes import Codes, Failure
-from spem.codes.collection import encode_file
 from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.errors import ModelError, ParameterError, ReadError
@@ -28,7 +26,8 @@ from spem.index.filters import literal
 from spem.index.models import ModelFacts
 from spem.index.row import Row
 from spem.index.schema import HEAVY, LIGHT
-from spem.index.searching import nearest
+from spem.index.searching import Search, search
+from spem.index.snapshot import Snapshots
 from spem.index.store import Store
 from spem.retrieval.labels import read_labels
 from spem.shapes.shape import Shape
@@ -44,6 +43,8 @@ class Index:
     ----------
     store
         The database.
+    snapshots
+        Codes that are kept in memory for search, and how much of it they may take.
 
     Examples
     --------
@@ -57,6 +58,7 @@ class Index:
     """
 
     store: Store
+    snapshots: Snapshots = field(default_factory=Snapshots, repr=False)
 
     @classmethod
     def open(
@@ -213,21 +215,47 @@ class Index:
 
     def search(
         self,
-        query: str | Path | Shape | NDArray[np.float32],
+        query: str | Path | Shape | NDArray[Any],
         k: int = 10,
         *,
         where: str | None = None,
-        model: str | None = None,
+        model: str | Model | Codes | None = None,
+        exact: bool | None = None,
+        rerank: bool = False,
+        volume_within: float | None = None,
     ) -> Answers:
-        """Return the shapes nearest to a query: a file, a shape, the id of a row, or a code."""
-        chosen = self.model(model)
-        if isinstance(query, np.ndarray):
-            code = np.asarray(query, np.float32)
-        elif isinstance(query, str) and not Path(query).is_file():
-            code = self.get(query, columns=HEAVY[:1], model=chosen.digest).code
-        else:
-            code = encode_file(query, chosen)
-        return nearest(self.store, chosen, code, k, where)
+        """Return the shapes nearest to a query.
+
+        Parameters
+        ----------
+        query
+            A file, a shape, a code, or the id, name or path of a shape of the index. What the index has is
+            not encoded again, and finds itself.
+        k
+            Number of answers; equally near ones are ordered by id.
+        where
+            Filter of the answers, as `rows` takes it.
+        model
+            Digest, where the index has several models.
+        exact
+            Whether all codes are compared, or the approximate index of `optimize` is asked; None compares all
+            up to 100,000, and beyond them too where there is no such index.
+        rerank
+            Whether the nearest 200 are put in the order of diffusion; distances are then those of diffusion.
+        volume_within
+            Largest ratio of the volumes of answers and query, such as 1.25, either way.
+
+        Raises
+        ------
+        ReadError
+            When there is no such file, and no such shape in the index.
+        ParameterError
+            When several shapes have that name, or a filter or a number has no meaning.
+        ModelError
+            When the query is no code, or not a shape, of that model.
+        """
+        wanted = Search(k, where, exact, rerank, volume_within)
+        return search(self.store, self.snapshots, self.digest(model), query, wanted)
 
     def get(self, row_id: str, *, columns: Sequence[str] = HEAVY, model: str | None = None) -> Row:
         """Return one row, with its code, picture and shape.
@@ -278,6 +306,16 @@ class Index:
     def count(self, where: str | None = None, *, model: str | None = None) -> int:
         """Return the number of rows that a filter lets through."""
         return self.store.count(self.digest(model), where)
+
+    def find(self, names: Sequence[str], *, model: str | None = None) -> list[str]:
+        """Return the ids of rows by their ids or paths; a file that holds several shapes has several.
+
+        Raises
+        ------
+        ReadError
+            When one is no shape of the index.
+        """
+        return updates.ids_of(self.store, self.digest(model), names)
 
     def remove(
         self, ids: str | Sequence[str] | None = None, *, where: str | None = None, model: str | None = None

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
-from spem.errors import ParameterError
+from spem.errors import ParameterError, ReadError
 from spem.index.changes import Known, Plan, place
 from spem.index.extra import require
 from spem.index.filters import any_of, to_sql
@@ -95,6 +96,29 @@ def relocate(store: Store, digest: str, plan: Plan) -> int:
             _update(store, digest, changed, _PATHS)
             deleted += _delete(store, digest, without)
     return deleted
+
+
+def ids_of(store: Store, digest: str, names: Sequence[str]) -> list[str]:
+    """Return the ids of rows by their ids or paths, in the order of these.
+
+    Raises
+    ------
+    ReadError
+        When one is no row.
+    """
+    ids = set(_read(store, digest, names))
+    others, by_place = [name for name in names if name not in ids], defaultdict(list)
+    if others:
+        for row in store.rows(digest):
+            for path in _paths(row):
+                by_place[place(path)].append(row.id)
+    stray = next((name for name in others if place(name) not in by_place), None)
+    if stray is not None:
+        msg = f"{stray}: neither id nor path of a shape of {store.address}; see: spem index list"
+        raise ReadError(msg)
+    return list(
+        dict.fromkeys(key for name in names for key in ([name] if name in ids else by_place[place(name)]))
+    )
 
 
 def remove(store: Store, digest: str, ids: Sequence[str]) -> int:
