@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -10,17 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from spem.cli.options import (
-    BoundaryChoice,
-    ComponentsChoice,
-    Device,
-    Jobs,
-    Json,
-    SchemeChoice,
-    check_device,
-)
+from spem.cli.options import Device, Jobs, Json, check_device
 from spem.cli.output import check_target, complain, counted, print_json
 from spem.cli.progress import Bar
+from spem.cli.settings_options import with_settings
 from spem.errors import ModelError, ParameterError, ReadError
 
 if TYPE_CHECKING:
@@ -29,6 +21,7 @@ if TYPE_CHECKING:
     from spem.codes.settings import Settings
 
 
+@with_settings
 def encode(
     paths: Annotated[
         list[str],
@@ -47,64 +40,9 @@ def encode(
     prune: Annotated[
         bool, typer.Option("--prune", help="Drop shapes of CODES whose files are no longer in PATH.")
     ] = False,
-    voxels: Annotated[int | None, typer.Option(min=1, help="Voxels inside each shape. [15000]")] = None,
-    own_grid: Annotated[
-        bool, typer.Option("--own-grid", help="Keep the grid of images and volumes, whatever their size.")
-    ] = False,
-    features: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND[+KIND...]",
-            help="spem, surface, spem+surface, or others by name. [auto: the best for the dimension]",
-        ),
-    ] = None,
-    boundary: Annotated[BoundaryChoice | None, typer.Option(help="Where v = 1. [surface]")] = None,
-    rho_range: Annotated[
-        list[str] | None,
-        typer.Option(metavar="LOW:HIGH", help="Range of ρ in units of the shape's size; may be repeated."),
-    ] = None,
-    n_rho: Annotated[int | None, typer.Option(min=1, help="Number of ρ in each range. [64]")] = None,
-    rho_scheme: Annotated[SchemeChoice | None, typer.Option(help="How ρ is spread. [linear]")] = None,
-    n_pairs: Annotated[
-        int | None, typer.Option(min=1, help="Eigenpairs that a signature is made of. [100]")
-    ] = None,
-    n_maps: Annotated[
-        int | None, typer.Option(min=1, help="Maps of each range. [8] Values of a signature. [surface: 16]")
-    ] = None,
-    n_centers: Annotated[
-        int | None,
-        typer.Option(min=1, help="Centres of each vocabulary. [64; fewer of few shapes]"),
-    ] = None,
-    power: Annotated[
-        float | None, typer.Option(help="Exponent of the residuals, α of (5.3), 0 to 1. [0.5]")
-    ] = None,
-    scaling: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND",
-            help="How maps are made comparable: standard, whiten, deviation or none. [standard]",
-        ),
-    ] = None,
-    moments: Annotated[
-        int | None, typer.Option(help="Moments of the residuals in a code, 1 or 2. [2]")
-    ] = None,
-    levels: Annotated[
-        int | None, typer.Option(min=1, help="Levels of the first map that are summed apart. [4; joined: 1]")
-    ] = None,
-    drop_boundary: Annotated[
-        bool | None, typer.Option("--drop-boundary/--keep-boundary", help="Leave out nodes at the boundary.")
-    ] = None,
-    threshold: Annotated[float | None, typer.Option(help="Grey level of the surface.")] = None,
-    dark: Annotated[
-        bool | None, typer.Option("--dark/--light", help="Whether shapes are darker than the ground.")
-    ] = None,
-    per_label: Annotated[
-        bool | None,
-        typer.Option("--per-label/--all-labels", help="Each label of a volume an object, or all one shape."),
-    ] = None,
-    components: Annotated[ComponentsChoice | None, typer.Option(help="What is kept. [largest]")] = None,
+    *,
+    options: dict[str, Any],
     paper: Annotated[bool, typer.Option("--paper", help="Settings of the paper, section 5.5.")] = False,
-    seed: Annotated[int | None, typer.Option(help="Seed of the vocabulary. [0]")] = None,
     jobs: Jobs = None,
     device: Device = "cpu",
     json: Json = False,
@@ -132,40 +70,15 @@ def encode(
     from spem.codes.settings import Settings
 
     check_device(device)
-    if own_grid and voxels is not None:
-        msg = f"--own-grid and --voxels {voxels} exclude each other; give one of them"
-        raise ParameterError(msg)
-    given = _given(
-        voxels=voxels,
-        features=features,
-        boundary=boundary,
-        rho_ranges=_ranges(rho_range),
-        n_rho=n_rho,
-        scheme=rho_scheme,
-        n_pairs=n_pairs,
-        n_maps=n_maps,
-        n_centers=n_centers,
-        power=power,
-        scaling=scaling,
-        moments=moments,
-        levels=levels,
-        drop_boundary=drop_boundary,
-        threshold=threshold,
-        dark=dark,
-        per_label=per_label,
-        components=components,
-        seed=seed,
-    )
-    given |= {"voxels": None} if own_grid else {}
     if not paper:
-        Settings.of(given)
+        Settings.of(options)
     for target in (output, save_vocabulary):
         if target is not None:
             check_target(target)
     codes, failures = encode_paths(
         paths,
         output,
-        given,
+        options,
         vocabulary=vocabulary,
         overwrite=overwrite,
         prune=prune,
@@ -329,29 +242,6 @@ def _settings(
             msg = f"{key}={value}: {source} has {key}={fixed}; leave it out, or write another file"
             raise ParameterError(msg)
     return None
-
-
-def _given(**options: Any) -> dict[str, Any]:
-    """Return the options that were given, choices by the names that settings have for them."""
-    return {key: getattr(value, "value", value) for key, value in options.items() if value is not None}
-
-
-def _ranges(texts: list[str] | None) -> tuple[tuple[float, float], ...] | None:
-    """Parse ranges of ρ."""
-    if not texts:
-        return None
-    ranges = []
-    for text in texts:
-        try:
-            low, high = (float(part) for part in text.split(":"))
-        except ValueError as error:
-            msg = f"--rho-range {text}: expected LOW:HIGH, such as 0.025:0.25, in units of the shape's size"
-            raise ParameterError(msg) from error
-        if not 0 < low < high < math.inf:
-            msg = f"--rho-range {text}: expected 0 < LOW < HIGH, in units of the shape's size"
-            raise ParameterError(msg)
-        ranges.append((low, high))
-    return tuple(ranges)
 
 
 def _report(failure: Failure) -> None:
