@@ -36,7 +36,7 @@ def serve(
         typer.Option(metavar="ADDRESS", help="A proxy whose X-Forwarded-For is believed."),
     ] = None,
     root_path: Annotated[str, typer.Option(metavar="PATH", help="Path that a proxy strips.")] = "",
-    workers: Annotated[int, typer.Option(min=1, max=256, help="Processes for uploads and views.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, max=256, help="Processes for uploads and views.")] = 2,
     memory: Annotated[int, typer.Option(min=512, help="Memory of each of them, in MiB.")] = 4096,
     seconds: Annotated[float, typer.Option(min=1.0, help="Longest time of one task.")] = 120.0,
     upload: Annotated[int, typer.Option(min=1, help="Largest upload, in MiB.")] = 64,

@@ -16,7 +16,7 @@ from starlette.responses import Response
 from spem import __version__
 from spem.errors import SpemError
 from spem.index.index import Index
-from spem.server import routes_service, routes_shapes
+from spem.server import routes_jobs, routes_service, routes_shapes, routes_views
 from spem.server.middleware import Doorkeeper
 from spem.server.options import ServerOptions
 from spem.server.pages import page_routes
@@ -75,7 +75,7 @@ def create_app(index: Index, options: ServerOptions | None = None) -> FastAPI:
         redirect_slashes=False,
     )
     app.state.services = services
-    for routes in (routes_service, routes_shapes):
+    for routes in (routes_service, routes_shapes, routes_views, routes_jobs):
         app.include_router(routes.router)
     app.include_router(page_routes())
     app.add_middleware(Doorkeeper, services=services, names=_names(chosen))

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from spem.index.index import Index
 from spem.index.row import Row
 from spem.index.schema import LIGHT
-from spem.server.cards import full_card, ranking
+from spem.server.cards import card, ranking
 from spem.server.queries import Filters, Sort, is_digest, is_id, quoted
 from spem.server.refusals import Refusal
 
@@ -136,20 +136,18 @@ class Catalogue:
                 return found[0]
         raise Refusal(404, "no such shape; it may have been removed")
 
-    def card(self, digest: str, key: str) -> dict[str, Any]:
-        """Return all that is told of a row."""
-        return full_card(self.row(digest, key), digest)
-
     def thumbnail(self, digest: str, key: str) -> bytes:
         """Return the picture of a row; empty where its dimension has none."""
         return self._thumbnails.get((digest, key), lambda: self.row(digest, key, ("thumbnail",)).thumbnail)
 
-    def neighbours(self, digest: str, key: str, k: int, where: str | None, options: dict[str, Any]) -> Any:
-        """Return the shapes nearest to one of the index."""
+    def neighbours(
+        self, digest: str, query: Row, k: int, where: str | None, *, rerank: bool
+    ) -> dict[str, Any]:
+        """Return the shapes nearest to a row, of the index or of an upload."""
         begin = time.perf_counter()
-        query = self.row(digest, key)
-        answers = self.index.search(key, k, where=where, model=digest, **options)
-        return ranking(full_card(query, digest), answers, time.perf_counter() - begin)
+        options = {"rerank": True} if rerank else {}
+        answers = self.index.search(query.code, k, where=where, model=digest, **options)
+        return ranking(card(query), answers, time.perf_counter() - begin)
 
     def changed(self) -> None:
         """Forget what a write has made old."""

@@ -71,7 +71,7 @@ class ServerOptions:
     voxels: int = 250_000
     seconds: float = 120.0
     memory: int = 4 << 30
-    n_workers: int = 1
+    n_workers: int = 2
     queue: int = 16
     rate: float = 100.0
     view_bytes: int = 256 << 20

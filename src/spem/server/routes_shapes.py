@@ -7,12 +7,14 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Request
 from starlette.responses import Response
 
+from spem.server.cards import card, full_card
 from spem.server.queries import LONGEST_TEXT, Filters, Sort, parse_metadata
 from spem.server.refusals import Refusal
 from spem.server.replies import documented, documented_as, json_reply, kept_reply, tag_of
 from spem.server.routes_service import ModelName
 from spem.server.schemas import FullCard, Page, Ranking
 from spem.server.services import Live, Services
+from spem.server.submissions import UPLOAD
 
 router = APIRouter(prefix="/api/shapes", tags=["shapes"])
 _LARGEST_OFFSET = 10**9
@@ -44,8 +46,6 @@ def _page(
     live: Services, model: str | None, filters: Filters, sort: Sort, offset: int, limit: int
 ) -> dict[str, Any]:
     """Return a page of cards."""
-    from spem.server.cards import card
-
     total, rows = live.catalogue.page(live.catalogue.digest(model), filters, sort, offset, limit)
     return {"total": total, "shapes": [card(row) for row in rows]}
 
@@ -53,7 +53,8 @@ def _page(
 @router.get("/{id}", summary="One shape, with its report", responses=documented(FullCard, 404))
 async def shape(live: Live, id: ShapeId, model: ModelName = None) -> Response:  # noqa: A002
     """Tell all that is known of a shape."""
-    return json_reply(await live.reads.run(lambda: live.catalogue.card(live.catalogue.digest(model), id)))
+    digest, row = await live.reads.run(live.row, model, id)
+    return json_reply(full_card(row, digest))
 
 
 @router.get(
@@ -63,7 +64,7 @@ async def shape(live: Live, id: ShapeId, model: ModelName = None) -> Response:  
 )
 async def thumbnail(request: Request, live: Live, id: ShapeId, model: ModelName = None) -> Response:  # noqa: A002
     """Answer with a picture of at most some hundred pixels."""
-    picture = await live.reads.run(lambda: live.catalogue.thumbnail(live.catalogue.digest(model), id))
+    picture = await live.reads.run(_picture, live, model, id)
     if not picture:
         raise Refusal(404, "no picture of a shape of this dimension")
     return kept_reply(request, picture, "image/png", tag_of(picture))
@@ -82,9 +83,16 @@ async def neighbours(
 ) -> Response:
     """Search by a shape of the index, or by an upload of the last hour; it finds itself first."""
     where = Filters("", label or None, ndim, parse_metadata(metadata)).where()
-    options = {"rerank": True} if rerank else {}
-    return json_reply(
-        await live.reads.run(
-            lambda: live.catalogue.neighbours(live.catalogue.digest(model), id, k, where, options)
-        )
-    )
+
+    def find() -> dict[str, Any]:
+        digest, row = live.row(model, id, "vector")
+        return live.catalogue.neighbours(digest, row, k, where, rerank=rerank)
+
+    return json_reply(await live.reads.run(find))
+
+
+def _picture(live: Services, model: str | None, key: str) -> bytes:
+    """Return the thumbnail of a shape of the index, or of an upload."""
+    if key.startswith(UPLOAD):
+        return live.row(model, key)[1].thumbnail
+    return live.catalogue.thumbnail(live.catalogue.digest(model), key)

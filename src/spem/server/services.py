@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import tempfile
+from pathlib import Path
 from typing import Annotated
 
 from fastapi import Depends, Request
 
 from spem.index.index import Index
+from spem.index.row import Row
 from spem.server.cache import Cache
 from spem.server.catalogue import Catalogue
+from spem.server.forms import Forms
+from spem.server.jobs import Jobs
 from spem.server.lanes import Lane
 from spem.server.limits import Rate
 from spem.server.metrics import Metrics
 from spem.server.options import ServerOptions
+from spem.server.sandbox import Sandbox
+from spem.server.submissions import UPLOAD, Submissions
+from spem.server.viewing import Viewing
 
 _READERS = 4
 _READS_WAITING = 256
@@ -29,33 +39,75 @@ class Services:
         The settings of the server.
     """
 
+    sandbox: Sandbox
+    jobs: Jobs
+    viewing: Viewing
+
     def __init__(self, index: Index, options: ServerOptions) -> None:
         self.options = options
         self.catalogue = Catalogue(index)
+        self.submissions = Submissions(self.catalogue)
         self.reads = Lane("read", _READERS, _READS_WAITING)
+        self.views = Lane("view", options.n_workers, options.queue)
+        self.kept = Cache(options.view_bytes)
         self.rate = Rate(options.rate)
-        self.views = Cache(options.view_bytes)
+        self.forms = Forms()
         self.metrics = Metrics(self._readings)
-        self.ready = False
+        self._open = contextlib.ExitStack()
+        self._started = False
 
     async def start(self) -> None:
-        """Warm the index, then say that the server is ready."""
+        """Start worker processes, take up jobs of an earlier run, and warm the index."""
+        options = self.options
+        folder = options.state or Path(self._open.enter_context(tempfile.TemporaryDirectory(prefix="spem-")))
+        self.sandbox = Sandbox(options.n_workers, options.memory, options.seconds)
+        self._open.callback(self.sandbox.close)
+        self.viewing = Viewing(self.sandbox, self.kept, self.views)
+        index, steps = self.catalogue.index, self.submissions.steps
+        self.jobs = Jobs(folder, self.sandbox, index, steps, queue=options.queue)
         await self.reads.run(self.catalogue.models)
-        self.ready = True
+        self._started = True
 
     async def close(self) -> None:
-        """Let go of threads and processes."""
-        self.ready = False
-        self.reads.close()
+        """Finish jobs or put them back, then end worker processes and threads."""
+        self._started = False
+        await asyncio.to_thread(self.jobs.close, self.options.finish_seconds)
+        for lane in (self.reads, self.views):
+            lane.close()
+        await asyncio.to_thread(self._open.close)
+
+    @property
+    def ready(self) -> bool:
+        """Whether the index is open and worker processes run."""
+        return self._started and self.sandbox.ready()
+
+    def row(self, model: str | None, key: str, *columns: str) -> tuple[str, Row]:
+        """Return the model and the row of a shape of the index, or of an upload; it may block.
+
+        Raises
+        ------
+        Refusal
+            When there is none.
+        """
+        if key.startswith(UPLOAD):
+            return self.submissions.found(self.jobs, key)
+        digest = self.catalogue.digest(model)
+        return digest, self.catalogue.row(digest, key, columns)
 
     def _readings(self) -> dict[str, tuple[str, float]]:
         """Return the figures of the moment."""
         shapes = sum(entry.n_shapes for entry in self.catalogue.models())
-        return {
+        figures: dict[str, tuple[str, float]] = {
             "spem_index_shapes": ("Shapes of the index, over all models.", shapes),
             "spem_reads_inside": ("Reads of the index that run or wait.", self.reads.inside),
-            "spem_view_cache_bytes": ("Memory of computed views.", self.views.n_bytes),
+            "spem_views_inside": ("Views that are computed or wait.", self.views.inside),
+            "spem_view_cache_bytes": ("Memory of computed views.", self.kept.n_bytes),
         }
+        for state, count in self.jobs.stats().items():
+            figures[f"spem_jobs_{state}"] = (f"Jobs that are {state}.", count)
+        for name, count in self.sandbox.stats().items():
+            figures[f"spem_sandbox_{name}"] = (f"Worker processes and their tasks: {name}.", count)
+        return figures
 
 
 async def services_of(request: Request) -> Services:
