@@ -23,9 +23,9 @@ _UNREACHABLE = re.compile(
     re.IGNORECASE,
 )
 CONFLICT = re.compile(r"conflict|concurrent|contention|preempted|Too many", re.IGNORECASE)
-_FILTER = re.compile(
-    r"no field named|does not exist|parsing statement|sql parser|schema error|type_coercion|plan|cast|"
-    r"function|not found in|unsupported|arrow error|unterminated|tokeniz|expected",
+# What a filter cannot bring about: bytes that are not what they should be.
+_DAMAGE = re.compile(
+    r"not found: |\(IO\)|corrupt|appear to be a lance|local ?file ?system|magic|panic|decod|buffer",
     re.IGNORECASE,
 )
 
@@ -82,7 +82,7 @@ def told(address: str, *, writing: bool = False, where: str | None = None) -> It
 def _ours(error: BaseException, address: str, *, writing: bool, where: str | None) -> SpemError:
     """Choose the error that says the same."""
     text, said = str(error), brief(error)
-    if where is not None and _FILTER.search(text):
+    if where is not None and isinstance(error, (ValueError, RuntimeError)) and not _DAMAGE.search(text):
         msg = f"where={where!r}: no filter of rows ({said}); write SQL such as label = 'cat' AND volume > 2"
         return ParameterError(msg)
     if _FULL.search(text):

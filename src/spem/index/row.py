@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import math
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -12,13 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import ReadError
+from spem.errors import ReadError, SpemError
 from spem.files import DAMAGE
 from spem.shapes.packing import pack_shape, unpack_shape
 from spem.shapes.shape import Shape
 
 # Hex digits of the content hash that tell rows apart: 80 bits, so that 10^9 shapes collide with odds of 1e-6.
 ID_DIGITS = 20
+# Steps of an edge that a cut is kept to: one half, where nothing is known of a cut, is one of them.
+_STEPS = 2**12
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,15 +93,33 @@ def row_id(content_hash: str, suffix: str = "") -> str:
 def pack(shape: Shape) -> bytes:
     """Return a shape as bytes: a compressed npz without pickle.
 
+    Where the surface cuts edges is kept to 1/8192 of an edge, vertices of a surface to 1e-7 of its extent. Of
+    15,000 nodes that makes 5 kB in the plane and 36 kB in space, beside some 8 bytes for each triangle. Codes of
+    maps made of what `unpack` gives are within 1e-5, in correlation distance, of those of the shape itself.
+    Wave kernel signatures of surfaces that are remeshed and inner distances may be 0.05 away: they hang on choices
+    that any change of 1e-9 can turn.
+
     Examples
     --------
     >>> unpack(pack(Shape.from_mask(np.ones((2, 3)), name="slab")))
     Shape('slab', 2-D, 6 nodes, grid 4 x 5, spacing 1 x 1)
     """
     arrays, attributes = pack_shape(shape)
-    header = np.frombuffer(json.dumps(attributes).encode(), np.uint8)
+    nodes = arrays.pop("voxels")
+    attributes["grid"] = list(shape.mask.shape)
+    packed: dict[str, Any] = {
+        "mask": np.packbits(shape.mask),
+        "cut_edges": _edges(nodes, arrays.pop("cut_voxel"), arrays.pop("cut_direction"), shape.ndim),
+        "cut_steps": _planes(np.maximum(np.rint(arrays.pop("cut_fraction") * _STEPS), 1).astype("<u2")),
+    }
+    if shape.surface is not None:
+        vertices = arrays.pop("surface_vertices")
+        packed["surface_corner"] = vertices.min(axis=0)
+        packed["surface_offsets"] = _planes((vertices - vertices.min(axis=0)).astype("<f4").ravel())
+        packed["surface_faces"] = _planes(arrays.pop("surface_faces").astype("<u4").ravel())
+    packed["attributes"] = np.frombuffer(json.dumps(attributes).encode(), np.uint8)
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **{**arrays, "attributes": header})
+    np.savez_compressed(buffer, **packed, **arrays)
     return buffer.getvalue()
 
 
@@ -112,7 +134,36 @@ def unpack(data: bytes, name: str = "shape") -> Shape:
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             arrays = {key: file[key] for key in file.files}
-        return unpack_shape(arrays, json.loads(arrays.pop("attributes").tobytes()))
-    except DAMAGE as error:
+        attributes = json.loads(arrays.pop("attributes").tobytes())
+        size = math.prod(attributes["grid"])
+        nodes = np.flatnonzero(np.unpackbits(arrays.pop("mask"), count=size))
+        voxel, direction = np.nonzero(np.unpackbits(arrays.pop("cut_edges"), axis=1))
+        arrays |= {"voxels": nodes, "cut_voxel": nodes[voxel], "cut_direction": direction}
+        arrays["cut_fraction"] = _joined(arrays.pop("cut_steps"), "<u2") / _STEPS
+        if "surface_corner" in arrays:
+            offsets = _joined(arrays.pop("surface_offsets"), "<f4").reshape(-1, 3)
+            arrays["surface_vertices"] = arrays.pop("surface_corner") + offsets
+            arrays["surface_faces"] = _joined(arrays["surface_faces"], "<u4").reshape(-1, 3).astype(np.int64)
+        return unpack_shape(arrays, attributes)
+    except (*DAMAGE, SpemError, zlib.error) as error:
         msg = f"{name}: its packed shape is damaged ({error}); add its file again"
         raise ReadError(msg) from error
+
+
+def _edges(
+    nodes: NDArray[np.int64], voxel: NDArray[np.int64], direction: NDArray[np.uint8], ndim: int
+) -> NDArray[np.uint8]:
+    """Return for each node, as bits, which of its edges are cut; cuts come in this order."""
+    cut = np.zeros((nodes.size, 2 * ndim), bool)
+    cut[np.searchsorted(nodes, voxel), direction] = True
+    return np.packbits(cut, axis=1)
+
+
+def _planes(values: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return the first bytes of all values, then the second ones and so on, which compresses better."""
+    return np.ascontiguousarray(values.view(np.uint8).reshape(values.size, values.itemsize).T)
+
+
+def _joined(planes: NDArray[np.uint8], kind: str) -> NDArray[Any]:
+    """Return the values that `_planes` took apart."""
+    return np.ascontiguousarray(planes.T).reshape(-1).view(kind)
