@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import ParameterError
+from spem.errors import ParameterError, ShapeError
 from spem.shapes.rescale import to_voxel_budget
 from spem.shapes.shape import Shape
 
@@ -18,6 +18,8 @@ Reply: TypeAlias = tuple[dict[str, Any], dict[str, NDArray[Any]]]
 # A body of a few megabytes, which a browser multiplies in 10 ms.
 MOST_NODES = 60_000
 _LIMITS = (100, 2_000_000)
+# Where limbs or sheets fall between the nodes of a coarser grid, more of the volume is lost.
+_VOLUME_CHANGE = 0.1
 
 
 def whole_option(options: Options, name: str, default: int, least: int, most: int) -> int:
@@ -63,7 +65,24 @@ def shown_shape(shape: Shape, options: Options) -> Shape:
     (400, True)
     """
     most = whole_option(options, "max_nodes", MOST_NODES, *_LIMITS)
-    return shape if shape.n_nodes <= most else to_voxel_budget(shape, most)
+    return coarser_shape(shape, most)
+
+
+def coarser_shape(shape: Shape, n_nodes: int) -> Shape:
+    """Return a shape of so many nodes; itself where it has no more, or would lose its thin parts.
+
+    Examples
+    --------
+    >>> coarser_shape(Shape.from_mask(np.ones((40, 40))), 400).n_nodes
+    400
+    """
+    if shape.n_nodes <= n_nodes:
+        return shape
+    try:
+        coarse = to_voxel_budget(shape, n_nodes)
+    except ShapeError:
+        return shape
+    return coarse if abs(coarse.volume / shape.volume - 1) < _VOLUME_CHANGE else shape
 
 
 def plain_length(rho: float) -> float | str:
