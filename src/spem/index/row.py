@@ -97,7 +97,7 @@ def pack(shape: Shape) -> bytes:
     15,000 nodes that makes 5 kB in the plane and 36 kB in space, beside some 8 bytes for each triangle.
 
     Codes of maps made of what `unpack` gives are within 1e-5, in correlation distance, of those of the shape
-    itself. Wave kernel signatures of surfaces that are remeshed and inner distances may be 0.05 away: they hang
+    itself. Wave kernel signatures of remeshed surfaces and inner distances may be 0.05 away: they hang
     on choices that any change of 1e-9 can turn.
 
     Examples
