@@ -1,0 +1,236 @@
+/** The page of one shape: its picture, what it is coloured by, the profile of a point, and what is known of it. */
+
+import { debounced, download, element } from "./dom.js";
+import { Bar, withBar } from "./shape_bar.js";
+import { colourField, colourMap, colourParts, colourSource, colourStrength, Colouring, shown } from "./shape_colouring.js";
+import { Controls } from "./shape_controls.js";
+import { onTheme } from "./colours.js";
+import { loadParts, loadShape, loadSource } from "./shape_data.js";
+import { downloads, facts, report, similar } from "./shape_details.js";
+import { Profile } from "./shape_profile.js";
+import { Stage } from "./shape_stage.js";
+import { readView, writtenRho } from "./shape_state.js";
+
+/** Draw the page of a shape; the address says what is looked at. */
+export async function renderShape(root, id, state, setState) {
+  document.title = "Shape · spem";
+  root.replaceChildren(element("p", { class: "shape-note", role: "status" }, "Solving for the fields of the shape…"));
+  const page = new ShapePage(id, await loadShape(id), setState);
+  document.title = `${page.card.name} · spem`;
+  root.replaceChildren(page.root);
+  page.update(state);
+  return page;
+}
+
+class ShapePage {
+  constructor(id, { card, geometry, fields }, setState) {
+    Object.assign(this, { id, card, geometry, fields, setState, state: {}, fetched: new Map() });
+    const patches = (geometry.arrays.contour_patch ?? geometry.arrays.vertex_patch).values;
+    this.nSources = geometry.header.n_patches ?? patches.reduce((most, patch) => Math.max(most, patch), 0) + 1;
+    this.colouring = new Colouring(geometry.n);
+    this.bar = new Bar();
+    this.stage = new Stage(geometry, {
+      onNode: (node, how) => this.chooseNode(node, how),
+      onSource: (source) => this.change({ show: "source", source: String(source) }),
+      onSlice: (axis, place) => this.cut(axis, place),
+      onHover: (node) => this.hover(node),
+    });
+    this.controls = new Controls(
+      { fields, nSources: this.nSources, solid: geometry.ndim === 3 },
+      { onRho: (place) => this.slide(place), onChange: (changes) => this.change(changes) },
+    );
+    this.profile = new Profile(fields, card.name);
+    this.keepRhoSoon = debounced(() => this.keepRho(), 250);
+    this.root = this.layout();
+    this.stopTheme = onTheme(() => this.draw());
+  }
+
+  layout() {
+    const heading = (text) => element("h2", {}, text);
+    this.readout = element("p", { class: "shape-readout", role: "status" });
+    this.caption = element("figcaption", { class: "shape-note" });
+    this.figure = element("figure", { class: "shape-card shape-figure" }, this.stage.root, this.bar.root, this.readout, this.caption);
+    this.pointTitle = heading("Field against ρ");
+    this.pointNote = element("p", { class: "shape-note" });
+    const point = element("section", { class: "shape-card" }, this.pointTitle, this.pointNote, this.profile.root);
+    this.comparison = element("section", { class: "shape-card shape-compared", hidden: true });
+    this.files = element("div");
+    return element(
+      "article",
+      { class: "shape" },
+      element("header", { class: "shape-head" }, element("h1", {}, this.card.name), element("p", {}, facts(this.card))),
+      element("div", { class: "shape-main" }, this.figure, element("div", { class: "shape-side" }, this.controls.root, point)),
+      this.comparison,
+      element("section", {}, heading("Similar shapes"), ...similar(this.id)),
+      element("div", { class: "shape-more" },
+        element("section", {}, heading("About this shape"), report(this.card, this.geometry)),
+        element("section", {}, heading("Downloads"), this.files)),
+    );
+  }
+
+  /** Show what the address says. */
+  update(state) {
+    this.state = { ...state };
+    const before = this.view?.compare;
+    this.view = readView(this.state, this);
+    this.draw();
+    if ((this.view.compare ?? null) !== (before ?? null)) this.compare(this.view.compare);
+  }
+
+  /** Look at something else, and let the address say so. */
+  change(changes, { push = true } = {}) {
+    this.keepRho();
+    this.setState(changes, { push });
+    this.update({ ...this.state, ...changes });
+  }
+
+  /** Let the address say the rho that the slider was left at. */
+  keepRho() {
+    if (this.state.rho !== undefined && this.root.isConnected) this.setState({ rho: this.state.rho });
+  }
+
+  /** Move to another rho: the next frame shows it. */
+  slide(place) {
+    this.asked ??= performance.now();
+    this.view.place = place;
+    this.keepRhoSoon();
+    this.frame ??= requestAnimationFrame(() => {
+      this.frame = null;
+      this.state.rho = writtenRho(this.fields, this.view.place);
+      this.paint();
+      const asked = this.asked;
+      this.asked = null;
+      // What is drawn here is on the screen when the next frame begins.
+      requestAnimationFrame(() => (this.figure.dataset.milliseconds = (performance.now() - asked).toFixed(1)));
+    });
+  }
+
+  chooseNode(node, { patch, typed } = {}) {
+    const changes = { node: String(node) };
+    if (patch !== undefined && this.view.show === "source") changes.source = String(patch);
+    if (this.geometry.ndim === 3) changes.slice = [...this.geometry.place(node)].join(",");
+    this.change(changes, { push: !typed });
+  }
+
+  cut(axis, place) {
+    const middle = this.geometry.place(this.geometry.middle());
+    const slice = Array.from(this.view.slice ?? middle);
+    slice[axis] = place;
+    this.change({ slice: slice.join(",") }, { push: false });
+  }
+
+  /** Say the value under the pointer, or that of the chosen node. */
+  hover(node) {
+    const at = node >= 0 ? node : this.view.node;
+    if (at === null) {
+      this.readout.textContent = "Click a point, or use the arrow keys on the picture.";
+      return;
+    }
+    const names = this.geometry.header.axes ?? [];
+    const place = this.geometry.position(at).map((value, axis) => `${names[axis] ?? `axis ${axis}`} ${shown(value, 4)}`);
+    this.readout.textContent = `${this.colouring.valueOf(at)} at ${place.join(", ")}`;
+  }
+
+  /** Something of the server, asked for once; null until it is here, when the page is drawn again. */
+  get(key, load) {
+    const known = this.fetched.get(key);
+    if (known !== undefined) return known;
+    this.fetched.set(key, null);
+    this.figure.setAttribute("aria-busy", "true");
+    load()
+      .then((answer) => this.fetched.set(key, answer))
+      .catch((error) => {
+        this.fetched.delete(key);
+        this.failure = error.message;
+      })
+      .finally(() => {
+        this.figure.removeAttribute("aria-busy");
+        if (this.failure) this.caption.textContent = this.failure;
+        else this.draw();
+        this.failure = null;
+      });
+    return null;
+  }
+
+  /** Write the colours of what is looked at; false while they are on their way. */
+  colour() {
+    const { show, place, fit, map, k, part, source } = this.view;
+    if (show === "field") colourField(this.colouring, this.fields, place, fit);
+    else if (show === "map") colourMap(this.colouring, this.fields, map);
+    else if (show === "source") {
+      const found = this.get(`source ${source ?? 0}`, () => loadSource(this.id, source ?? 0));
+      if (!found) return false;
+      colourSource(this.colouring, found);
+      this.controls.showSource(found);
+    } else {
+      const found = this.get(`parts ${k}`, () => loadParts(this.id, k));
+      if (!found) return false;
+      const picked = part !== null && part < found.header.k ? part : null;
+      if (show === "strength" && picked !== null) colourStrength(this.colouring, found, picked);
+      else colourParts(this.colouring, found, picked);
+      this.controls.showParts(found, picked);
+    }
+    return true;
+  }
+
+  draw() {
+    const { node, source, show, slice } = this.view;
+    this.controls.update(this.view);
+    this.stage.show({ node, source: show === "source" ? (source ?? 0) : null, places: slice });
+    if (this.profile.node !== node) this.profile.show(node);
+    this.pointNote.textContent = node === null
+      ? "How far the boundary is felt, over the whole shape. Choose a point of the picture to see its own curve."
+      : `Node ${node}, beside all ${this.geometry.n.toLocaleString("en")} nodes of the shape.`;
+    this.files.replaceChildren(downloads(this.id, this.geometry.ndim, this.view, () => this.savePicture()));
+    this.paint();
+  }
+
+  /** Colour the pictures, and say what they show. */
+  paint() {
+    this.profile.move(this.view.place);
+    if (this.view.show === "field") this.controls.moveTo(this.view.place);
+    if (!this.colour()) {
+      this.caption.textContent = this.view.show === "source" ? "Solving for the source…" : "Dividing the shape into parts…";
+      return;
+    }
+    this.stage.paint(this.colouring);
+    this.bar.show(this.colouring);
+    this.hover(-1);
+    const solid = this.geometry.ndim === 3;
+    this.caption.textContent = solid ? "The surface has the values of the nodes just inside it; on the surface itself the field is 1. Slices show the inside." : "";
+    const { title, low, high, labels } = this.colouring;
+    const range = labels ? labels.map(({ label, size }) => `part ${label + 1} ${shown(100 * size)} %`).join(", ") : `from ${shown(low)} to ${shown(high)}`;
+    this.stage.describe(`${solid ? "Surface" : "Picture"} of ${this.card.name}. ${title}, ${range}. Arrow keys ${solid ? "turn it" : "choose a point"}.`);
+  }
+
+  savePicture() {
+    const what = `${this.card.name}-${this.colouring.title}`.replace(/[^\p{L}\p{N}.]+/gu, "-");
+    withBar(this.stage.drawn(), this.colouring).toBlob((blob) => download(`${what}.png`, blob, "image/png"));
+  }
+
+  /** Set another shape beside this one, or none. */
+  async compare(other) {
+    this.comparison.hidden = other === null;
+    this.comparison.replaceChildren();
+    this.beside?.destroy();
+    this.beside = null;
+    if (other === null) return;
+    const close = element("button", { type: "button", class: "button small", onclick: () => this.change({ compare: null }) }, "Close");
+    const body = element("div", {}, element("p", { class: "shape-note", role: "status" }, "Loading both shapes…"));
+    this.comparison.append(element("div", { class: "shape-compared-head" }, element("h2", {}, "Side by side"), close), body);
+    try {
+      const { compareShapes } = await import("./shape_compare.js");
+      const beside = await compareShapes(body, this.id, other);
+      if (this.view.compare === other) this.beside = beside;
+      else beside.destroy();
+    } catch (error) {
+      body.replaceChildren(element("p", { class: "shape-note" }, error.message));
+    }
+  }
+
+  destroy() {
+    this.stopTheme();
+    this.stage.destroy();
+    this.beside?.destroy();
+  }
+}
