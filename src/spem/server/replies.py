@@ -19,6 +19,7 @@ _MEANINGS = {
     403: "Not allowed.",
     404: "There is none.",
     413: "The body is too large.",
+    415: "No file of a kind that is read.",
     422: "A value is out of its range.",
     429: "Too many requests, or too long a queue; see Retry-After.",
     503: "Not ready yet.",
