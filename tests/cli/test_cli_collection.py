@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,7 @@ import pytest
 from typer.testing import Result
 
 from spem.codes.codes import Codes
+from spem.index.index import Index
 
 Spem = Callable[..., Result]
 Start = Callable[..., subprocess.Popen[str]]
@@ -253,7 +255,7 @@ def test_stopped_encode_goes_on(start: Start, spem: Spem, tmp_path: Path) -> Non
 
 
 def test_demo(spem: Spem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`demo` leaves collections, codes, pictures and reports, and says where."""
+    """`demo` leaves collections, codes, pictures, reports and an index, and says where and how to see them."""
     monkeypatch.setattr("spem.cli.demo.CREATURES_PER_CLASS", 2)
     monkeypatch.setattr("spem.cli.demo.VOXELS", 1500)
     monkeypatch.setattr("spem.cli.demo.KINDS", ("fish", "starfish"))
@@ -264,3 +266,17 @@ def test_demo(spem: Spem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     for name in ("images-parts.png", "meshes-parts.png", "meshes-parts.html", "meshes-report.html"):
         assert name in result.stdout
         assert (tmp_path / "d" / name).stat().st_size > 1000
+    assert result.stdout.splitlines()[-1].strip() == f"spem serve {tmp_path / 'd' / 'index'} --open"
+    assert len(Index.open(tmp_path / "d" / "index")) == 8
+
+
+def test_demo_without_the_index(spem: Spem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the packages of the index are not installed, `demo` does the rest, and says what is missing."""
+    monkeypatch.setattr("spem.cli.demo.CREATURES_PER_CLASS", 2)
+    monkeypatch.setattr("spem.cli.demo.VOXELS", 1000)
+    monkeypatch.setattr("spem.cli.demo.KINDS", ("fish",))
+    monkeypatch.setitem(sys.modules, "lancedb", None)
+    result = spem("demo", tmp_path / "d")
+    assert result.exit_code == 0, result.output
+    assert "pip install 'spem[" in result.stderr
+    assert not (tmp_path / "d" / "index").exists()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,12 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spem.cli.encode import encode_paths
-from spem.cli.evaluate import REPORT, print_scores, score, summary
+from spem.cli.evaluate import REPORT, print_scores, score, size_scores, summary
 from spem.cli.options import Json
-from spem.cli.output import check_folder, print_json, print_table
+from spem.cli.output import check_folder, complain, print_json, print_table
 
 if TYPE_CHECKING:
     from spem.codes.codes import Codes
+    from spem.codes.model import Model
+
+INDEX = "index"
 
 # Enough for scores that mean something, and for a minute on two cores.
 CREATURES_PER_CLASS = 5
@@ -37,7 +42,7 @@ def demo(
     """Make a collection, and all that can be made of it.
 
     Creatures as silhouettes and as meshes, their codes, answers to a query, scores, pictures of fields, maps
-    and parts, and a report.
+    and parts, a report, and an index of them all for the explorer.
 
     \b
     Examples:
@@ -53,17 +58,46 @@ def demo(
     folders = write_collection(folder, n_per_class=CREATURES_PER_CLASS, kinds=KINDS, rng=rng)
     written: list[Path] = []
     facts: dict[str, Any] = {}
+    models = []
     for shapes in folders:
-        facts[shapes.name] = _collection(shapes, written, quiet=json)
+        facts[shapes.name], model = _collection(shapes, written, quiet=json)
+        models.append(model)
+    index, missing = _index(folder / INDEX, folders, models)
     if json:
-        print_json(facts | {"written": written})
+        print_json(facts | {"written": written, "index": index})
         return
     typer.echo("\npictures and reports:")
     for path in written:
         typer.echo(f"  {path}")
+    if index is None:
+        complain(f"no index was made: {missing}")
+        return
+    typer.echo(f"\nto open the explorer on these shapes:\n  {_command()} serve {index} --open")
 
 
-def _collection(shapes: Path, written: list[Path], *, quiet: bool) -> dict[str, Any]:
+def _index(folder: Path, folders: Sequence[Path], models: Sequence[Model]) -> tuple[Path | None, str]:
+    """Make an index of all shapes, with the model of each collection; or say what it lacks."""
+    from spem.errors import MissingExtraError
+    from spem.index.index import Index
+
+    try:
+        index = Index.open(folder)
+    except MissingExtraError as error:
+        return None, str(error)
+    for shapes, model in zip(folders, models, strict=True):
+        index.add(shapes, model=model, labels=shapes / "labels.csv", prune=True)
+    return folder, ""
+
+
+def _command() -> str:
+    """Return how this program is called from the shell, where it is not on the path."""
+    program = Path(sys.argv[0])
+    if program.name != "spem" or shutil.which("spem") == str(program.absolute()):
+        return "spem"
+    return str(program)
+
+
+def _collection(shapes: Path, written: list[Path], *, quiet: bool) -> tuple[dict[str, Any], Model]:
     """Encode, search and score one folder of shapes, and draw the first of them."""
     from spem.cli.report import write_collection_report
     from spem.collections import row_keys
@@ -74,20 +108,23 @@ def _collection(shapes: Path, written: list[Path], *, quiet: bool) -> dict[str, 
     codes, _ = encode_paths([str(shapes)], root / f"{shapes.name}.spem", {"voxels": VOXELS}, overwrite=True)
     classes = match_labels(row_keys(codes), read_labels(shapes / "labels.csv"))
     distances = correlation_distance(codes.vectors, codes.vectors)
-    scores = score(distances, classes)
+    scores, control = score(distances, classes), size_scores(codes, classes)
+    facts = summary(scores, control)
     if not quiet:
         typer.echo(f"\n{shapes}")
-        print_scores(summary(scores))
+        print_scores(facts)
         _print_answers(codes)
     pictures = [root / f"{shapes.name}-fields.png", root / f"{shapes.name}-maps.png"]
     _draw(Path(codes.paths[0]), *pictures)
     report = root / f"{shapes.name}-{REPORT}"
     title = f"Creatures, {shapes.name}"
-    page = write_collection_report(report, codes, classes, scores, distances=distances, title=title)
+    page = write_collection_report(
+        report, codes, classes, scores, distances=distances, title=title, size_alone=control
+    )
     divided = [path for path, name in zip(codes.paths, classes, strict=True) if name == DIVIDED]
     parts = _divide((divided or codes.paths)[:POSES], root / f"{shapes.name}-parts.png")
     written += [*pictures, *parts, page]
-    return summary(scores)
+    return facts, codes.model
 
 
 def _print_answers(codes: Codes) -> None:

@@ -100,10 +100,8 @@ def evaluate(
     distances = correlation_distance(collection.vectors, collection.vectors)
     candidates = None if matched_size is None else of_one_size(collection.volumes, matched_size)
     scores = score(distances, classes, candidates)
-    facts = summary(scores)
     control = size_scores(collection, classes, candidates)
-    if control is not None:
-        facts["size_alone"] = {**control.mean(), "bulls_eye": control.bulls_eye}
+    facts = summary(scores, control)
     if matched_size is not None:
         facts["matched_size"] = matched_size
     if rerank:
@@ -224,9 +222,9 @@ def score(
     return scores
 
 
-def summary(scores: Scores) -> dict[str, Any]:
-    """Return scores as the JSON of the command line has them."""
-    return {
+def summary(scores: Scores, control: Scores | None) -> dict[str, Any]:
+    """Return scores, and those of size alone if known, as the JSON of the command line has them."""
+    facts = {
         **scores.mean(),
         "bulls_eye": scores.bulls_eye,
         "n_shapes": len(scores.labels),
@@ -234,6 +232,9 @@ def summary(scores: Scores) -> dict[str, Any]:
         "n_skipped": len(scores.skipped),
         "per_class": scores.per_class(),
     }
+    if control is not None:
+        facts["size_alone"] = {**control.mean(), "bulls_eye": control.bulls_eye}
+    return facts
 
 
 def print_scores(facts: dict[str, Any]) -> None:
