@@ -29,7 +29,8 @@ class Gallery {
     this.grid = element("ul", { class: "grid", role: "list", "aria-label": "Shapes" });
     this.more = element("div", { class: "more" });
     arrowKeys(this.grid);
-    const heading = element("div", { class: "heading" }, element("h1", {}, "Shapes"), this.count);
+    const lead = element("p", { class: "lead" }, "Drop a file anywhere, or paste one, to find the shapes nearest to it.");
+    const heading = element("div", { class: "heading" }, element("h1", {}, "Shapes"), this.count, lead);
     this.root.append(heading, this.toolbar(state), this.grid, this.more);
     this.fillLabels(state);
     this.load(state, 0);
