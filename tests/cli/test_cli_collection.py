@@ -255,7 +255,7 @@ def test_stopped_encode_goes_on(start: Start, spem: Spem, tmp_path: Path) -> Non
 
 
 def test_demo(spem: Spem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`demo` leaves collections, codes, pictures, reports and an index, and says where and how to see them."""
+    """`demo` leaves collections, codes, pictures, reports and an index, and says how to see them."""
     monkeypatch.setattr("spem.cli.demo.CREATURES_PER_CLASS", 2)
     monkeypatch.setattr("spem.cli.demo.VOXELS", 1500)
     monkeypatch.setattr("spem.cli.demo.KINDS", ("fish", "starfish"))
