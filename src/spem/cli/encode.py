@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -170,7 +169,7 @@ def encode_paths(
                 n_jobs=jobs or count_processes(len(files)),
                 work=work,
                 progress=bar.advance,
-                on_failure=_report,
+                on_failure=bar.fail,
             )
             failures = codes.failures
             if known is not None:
@@ -242,12 +241,6 @@ def _settings(
             msg = f"{key}={value}: {source} has {key}={fixed}; leave it out, or write another file"
             raise ParameterError(msg)
     return None
-
-
-def _report(failure: Failure) -> None:
-    """Tell of a file that gave no code."""
-    complain(str(failure))
-    sys.stderr.flush()
 
 
 def _tell(output: Path, codes: Codes, failures: tuple[Failure, ...], *, json: bool) -> None:

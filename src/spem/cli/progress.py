@@ -24,6 +24,7 @@ class Bar:
         self._stages: dict[str, TaskID] = {}
         self._seen: set[str] = set()
         self._progress: Progress | None = None
+        self._n_failed = 0
 
     def __enter__(self) -> Self:
         if sys.stderr.isatty():
@@ -52,5 +53,15 @@ class Bar:
         if self._progress is None:
             return
         if stage not in self._stages:
-            self._stages[stage] = self._progress.add_task(stage, total=total)
+            failed = f", {self._n_failed} failed" if self._n_failed else ""
+            self._stages[stage] = self._progress.add_task(stage + failed, total=total)
         self._progress.update(self._stages[stage], completed=done)
+
+    def fail(self, failure: object) -> None:
+        """Tell of a failure on a line of its own, and count it beside the bar."""
+        complain(str(failure))
+        sys.stderr.flush()
+        self._n_failed += 1
+        if self._progress is not None:
+            for stage, task in self._stages.items():
+                self._progress.update(task, description=f"{stage}, {self._n_failed} failed")

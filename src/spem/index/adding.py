@@ -18,7 +18,7 @@ from spem.codes.traits import kinds_of
 from spem.codes.work import clear_work
 from spem.errors import ModelError, ParameterError, ReadError
 from spem.index.batches import Batches
-from spem.index.changes import Plan, place, plan
+from spem.index.changes import Known, Plan, place, plan
 from spem.index.encoding import Describe, Described, Item
 from spem.index.executors import Executor, LocalExecutor
 from spem.index.naming import Labelling
@@ -44,6 +44,8 @@ class Added:
         Number of files that were there already.
     removed
         Number of files that were dropped since they are gone.
+    gone
+        Number of files of the folders given that are gone, but were not to be dropped.
     failures
         Files and labels that gave nothing, and why.
     model
@@ -54,6 +56,7 @@ class Added:
     updated: int = 0
     unchanged: int = 0
     removed: int = 0
+    gone: int = 0
     failures: tuple[Failure, ...] = ()
     model: str = ""
 
@@ -119,12 +122,12 @@ def add_sources(
             raise
     store.save_model(model)
     sources = [(source, key) for source, key in listing if key is not None]
-    folders = [each for each in given if isinstance(each, (str, Path))] if manner.prune else []
-    todo = plan(known(store, model.digest), sources, prune=folders)
+    folders = [each for each in given if isinstance(each, (str, Path))]
+    todo, n_gone = _plan(known(store, model.digest), sources, folders, prune=manner.prune)
     _encode(store, listing, todo, model, drafts, manner)
     relocate(store, model.digest, todo)
     clear_work(root)
-    return _summary(listing, todo, model)
+    return replace(_summary(listing, todo, model), gone=n_gone)
 
 
 def work_folder(address: str) -> Path:
@@ -147,6 +150,23 @@ def _sources(given: Iterable[str | Path | Shape]) -> list[Source]:
     for each in map(as_source, given):
         listed.extend([each] if isinstance(each, Shape) else find_files([each]))
     return listed
+
+
+def _plan(
+    rows: Iterable[Known],
+    sources: Sequence[tuple[Source, str]],
+    folders: Sequence[str | Path],
+    *,
+    prune: bool,
+) -> tuple[Plan, int]:
+    """Plan an addition, and count the files that are gone from the folders but stay in the index."""
+    todo = plan(rows, sources, prune=folders)
+    here = {place(source_path(source)) for source, _ in sources}
+    stays = {key: tuple(path for path in paths if place(path) in here) for key, paths in todo.lost.items()}
+    if prune:
+        return todo, 0
+    n_gone = len({path for paths in todo.lost.values() for path in paths if place(path) not in here})
+    return replace(todo, lost={key: paths for key, paths in stays.items() if paths}), n_gone
 
 
 def _encode(store: Store, listing: Listing, todo: Plan, model: Model, drafts: Drafts, manner: Manner) -> None:
@@ -203,7 +223,14 @@ def _summary(listing: Listing, todo: Plan, model: Model) -> Added:
     ] + [place(path) for paths in todo.gained.values() for path in paths]
     updated = sum(path in lost for path in new)
     failures = tuple(listing.failures)
-    return Added(len(new) - updated, updated, todo.n_unchanged, len(lost - here), failures, model.digest)
+    return Added(
+        len(new) - updated,
+        updated,
+        todo.n_unchanged,
+        len(lost - here),
+        failures=failures,
+        model=model.digest,
+    )
 
 
 def agreed_settings(
