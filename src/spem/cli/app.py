@@ -19,6 +19,8 @@ from spem.cli.encode import encode
 from spem.cli.evaluate import evaluate
 from spem.cli.fields import field
 from spem.cli.index import COMMANDS, group
+from spem.cli.index_add import add
+from spem.cli.index_search import COMMANDS as INDEX_SEARCH
 from spem.cli.info import info
 from spem.cli.maps import maps
 from spem.cli.output import complain
@@ -163,7 +165,8 @@ def _refuse(message: str) -> None:
 
 for _command in (info, field, maps, parts, encode, search, evaluate, demo, paper, serve):
     app.command()(guarded(_command))
-for _name, _of_index in {**COMMANDS}.items():
+_of_group: dict[str, Callable[..., None]] = {"add": add, **COMMANDS, **INDEX_SEARCH}
+for _name, _of_index in _of_group.items():
     group.command(_name)(guarded(_of_index))
 app.add_typer(group)
 

@@ -65,10 +65,10 @@ def add(
 ) -> None:
     """Add shapes to an index, and keep it up to date.
 
-    A new index learns its vocabulary from the shapes, as `spem encode` does; after that only files that are new
-    or have changed are encoded, and equal files are one row. Rows are written as they come. Files that fail are
-    told, one line each, and tried again next time; an interrupted run goes on when the same command is given
-    again. With --cluster the workers need spem and the same files, under the same paths.
+    A new index learns its vocabulary from the shapes, as `spem encode` does; after that only files that are
+    new or have changed are encoded, and equal files are one row. Rows are written as they come. Files that
+    fail are told, one line each, and tried again next time; an interrupted run goes on when the same command
+    is given again. With --cluster the workers need spem and the same files, under the same paths.
 
     \b
     Examples:
