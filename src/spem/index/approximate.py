@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -46,6 +46,8 @@ class Approximation:
         Share of the ten nearest other codes that were found, over 100 codes of the table.
     n_rows
         Rows of the table when that was measured.
+    n_trained
+        Rows of the table when the index was built.
     """
 
     kind: str
@@ -53,6 +55,7 @@ class Approximation:
     refine: int
     recall: float
     n_rows: int
+    n_trained: int
 
     @classmethod
     def of(cls, table: Any) -> Self | None:
@@ -72,7 +75,7 @@ def exhaustive(table: Any, vector: NDArray[np.float32]) -> Any:
     return table.search(vector).distance_type("l2").bypass_vector_index()
 
 
-def build(table: Any, kind: str = "IVF_PQ", **options: Any) -> None:
+def build(table: Any, kind: str = "IvfSq", **options: Any) -> None:
     """Build the approximate index of a table, in place of one that is there.
 
     Parameters
@@ -80,7 +83,7 @@ def build(table: Any, kind: str = "IVF_PQ", **options: Any) -> None:
     table
         The table.
     kind
-        One of LanceDB's kinds.
+        One of the kinds of `lancedb.index`.
     options
         For it.
 
@@ -105,7 +108,12 @@ def drop(table: Any) -> None:
 
 
 def measure(
-    table: Any, rng: np.random.Generator, *, probes: Sequence[int] = _PROBES, target: float = TARGET
+    table: Any,
+    rng: np.random.Generator,
+    *,
+    n_trained: int | None = None,
+    probes: Sequence[int] = _PROBES,
+    target: float = TARGET,
 ) -> Approximation:
     """Measure the recall of an approximate index, and keep the least number of cells that reaches a target.
 
@@ -115,6 +123,8 @@ def measure(
         The table.
     rng
         Chooses the codes to ask by.
+    n_trained
+        Rows of the table when the index was built; those it has now by default.
     probes
         Numbers of cells to try, ascending.
     target
@@ -123,13 +133,13 @@ def measure(
     n_rows = int(table.count_rows())
     queries = _sample(table, min(_QUERIES, n_rows), rng)
     true = nearest_cosines(table, queries, _ANSWERS + 1)
-    (index,) = (each for each in table.list_indices() if each.name == NAME)
+    kind = next(str(each.index_type) for each in table.list_indices() if each.name == NAME)
+    way = Approximation(kind, 0, _REFINE, 0.0, n_rows, n_trained or n_rows)
     for n_probes in probes:
-        way = Approximation(str(index.index_type), n_probes, _REFINE, 0.0, n_rows)
-        recall = recall_of(way, table, queries, true)
-        if recall >= target:
+        way = replace(way, n_probes=n_probes)
+        way = replace(way, recall=recall_of(way, table, queries, true))
+        if way.recall >= target:
             break
-    way = Approximation(way.kind, way.n_probes, way.refine, recall, n_rows)
     _keep(table, way)
     return way
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 from numpy.typing import NDArray
 
 from spem.codes.codes import Codes, Failure
@@ -20,10 +22,12 @@ from spem.index.annotations import annotated, labels_of
 from spem.index.answers import Answers
 from spem.index.checking import Finding, check
 from spem.index.cluster import ClusterExecutor
+from spem.index.duplicates import DISTANCE, Duplicates, find_duplicates
 from spem.index.executors import LocalExecutor
 from spem.index.exporting import codes_of, export
 from spem.index.filters import literal
 from spem.index.models import ModelFacts
+from spem.index.optimizing import Optimized, optimize
 from spem.index.row import Row
 from spem.index.schema import HEAVY, LIGHT
 from spem.index.searching import Search, search
@@ -256,6 +260,58 @@ class Index:
         """
         wanted = Search(k, where, exact, rerank, volume_within)
         return search(self.store, self.snapshots, self.digest(model), query, wanted)
+
+    def duplicates(
+        self,
+        distance: float = DISTANCE,
+        *,
+        where: str | None = None,
+        model: str | Model | Codes | None = None,
+    ) -> Duplicates:
+        """Return groups of near-duplicates: shapes joined by pairs that are nearer than a distance.
+
+        Parameters
+        ----------
+        distance
+            Correlation distance, in (0, 1).
+        where
+            Filter of the rows, as `rows` takes it.
+        model
+            Digest, where the index has several models.
+
+        Raises
+        ------
+        ParameterError
+            When the distance is out of its range or joins too many pairs, or codes do not fit into memory.
+        """
+        return find_duplicates(self.store, self.snapshots, self.digest(model), distance, where)
+
+    def optimize(
+        self,
+        *,
+        approximate: bool | None = None,
+        older_than: timedelta | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> tuple[Optimized, ...]:
+        """Join small files, delete old versions, and build or renew the approximate index.
+
+        Parameters
+        ----------
+        approximate
+            Whether search has an approximate index; None gives it one beyond 100,000 shapes, and keeps one
+            that is there. False drops it.
+        older_than
+            Age of the versions that are deleted, an hour by default; who still reads one of them fails.
+        rng
+            Chooses the 100 codes that recall is measured on.
+
+        Raises
+        ------
+        ParameterError
+            When an approximate index is asked for and there are too few codes to train it on.
+        """
+        chosen = np.random.default_rng(0) if rng is None else rng
+        return optimize(self.store, approximate_index=approximate, older_than=older_than, rng=chosen)
 
     def get(self, row_id: str, *, columns: Sequence[str] = HEAVY, model: str | None = None) -> Row:
         """Return one row, with its code, picture and shape.
