@@ -165,7 +165,7 @@ def _refuse(message: str) -> None:
 
 for _command in (info, field, maps, parts, encode, search, evaluate, demo, paper, serve):
     app.command()(guarded(_command))
-_of_group: dict[str, Callable[..., None]] = {"add": add, **COMMANDS, **INDEX_SEARCH}
+_of_group: dict[str, Any] = {"add": add, **COMMANDS, **INDEX_SEARCH}
 for _name, _of_index in _of_group.items():
     group.command(_name)(guarded(_of_index))
 app.add_typer(group)
