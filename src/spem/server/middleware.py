@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import secrets
 import time
 from typing import Any
@@ -21,7 +23,8 @@ _UNKNOWN = "unknown"
 # These stay quick under load, and are asked by machines that must not be turned away.
 _UNLIMITED = ("/health", "/ready", "/metrics")
 _LONGEST_ADDRESS = 8192
-_CLOSED = 499
+_CLOSED, _TOO_LARGE = 499, 413
+_SWALLOW_SECONDS = 20.0
 
 
 class Doorkeeper:
@@ -45,7 +48,7 @@ class Doorkeeper:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        reply = _Reply(send, head=scope["method"] == "HEAD")
+        reply = _Reply(send, receive, head=scope["method"] == "HEAD")
         client = client_of(scope, self._services.options.proxies)
         method = scope["method"]
         self._services.metrics.begin()
@@ -103,8 +106,8 @@ class Doorkeeper:
 class _Reply:
     """A `send` that adds the headers of every answer, and knows what was sent."""
 
-    def __init__(self, send: Send, *, head: bool) -> None:
-        self._send, self._head = send, head
+    def __init__(self, send: Send, receive: Receive, *, head: bool) -> None:
+        self._send, self._receive, self._head = send, receive, head
         self.begun = time.perf_counter()
         self.id = secrets.token_hex(6)
         self.status, self.n_bytes, self.started = 0, 0, False
@@ -121,7 +124,19 @@ class _Reply:
             self.n_bytes += len(message.get("body", b""))
             if self._head:
                 message["body"] = b""
+            if self.status == _TOO_LARGE and not message.get("more_body"):
+                await self._send({**message, "more_body": True})
+                await self._swallow()
+                message = {"type": message["type"], "body": b""}
         await self._send(message)
+
+    async def _swallow(self) -> None:
+        """Read what a client still sends, for a while: it reads the answer only when it has sent all."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_SWALLOW_SECONDS):
+                message: Message = {"more_body": True}
+                while message.get("more_body"):
+                    message = await self._receive()
 
 
 async def _finish(response: Any, scope: Scope, receive: Receive, reply: _Reply) -> None:

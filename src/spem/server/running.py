@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import sys
 
 from spem.errors import ParameterError
 from spem.index.index import Index
@@ -12,6 +13,7 @@ from spem.server.options import ServerOptions
 
 _KEEP_ALIVE = 30
 _CONNECTIONS = 1024
+_BACKLOG = 512
 
 
 def listen(options: ServerOptions) -> socket.socket:
@@ -23,14 +25,21 @@ def listen(options: ServerOptions) -> socket.socket:
         When the address cannot be had.
     """
     family = socket.AF_INET6 if ":" in options.host else socket.AF_INET
+    # With the protocol named, asyncio sends small answers at once instead of waiting for an acknowledgement.
+    opened = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
-        return socket.create_server((options.host, options.port), family=family, backlog=512)
+        if sys.platform != "win32":
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        opened.bind((options.host, options.port))
+        opened.listen(_BACKLOG)
     except OSError as error:
+        opened.close()
         reason = error.strerror or str(error)
         msg = (
             f"{options.host} port {options.port}: {reason.lower()}; give another --port, or 0 for a free one"
         )
         raise ParameterError(msg) from error
+    return opened
 
 
 def run(index: Index, options: ServerOptions, opened: socket.socket) -> None:
