@@ -81,7 +81,7 @@ class CollectionMap {
       this.setState({ label: chosen });
       this.filter({ ...this.state, label: chosen });
     });
-    this.side.prepend(this.legend.box);
+    this.side.firstChild.after(this.legend.box);
     this.retint = () => {
       this.picture.dress();
       this.legend.dress();

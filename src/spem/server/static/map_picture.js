@@ -3,8 +3,8 @@
 import { thumbnail } from "./api.js";
 import { sprite, style } from "./markers.js";
 
-const RADIUS = 5.5;
-const PICTURE = 64;
+const LARGEST = 6.5;
+const PICTURE = 56;
 const MOST_PICTURES = 120;
 const REACH = 16;
 
@@ -28,8 +28,17 @@ export class MapPicture {
     this.accent = colours.getPropertyValue("--accent").trim();
     const dark = document.documentElement.dataset.theme === "dark";
     this.styles = Array.from({ length: Math.max(this.n_labels, 1) }, (_, place) => style(place, dark));
-    this.sprites = this.styles.map((one) => sprite(one, RADIUS, this.ground));
+    this.sprites = null;
     this.draw();
+  }
+
+  /** Markers, smaller in a crowd and larger on closer view. */
+  size() {
+    const crowd = this.points.length > 2000 ? 3 : this.points.length > 400 ? 4 : 5.5;
+    const radius = Math.round(2 * Math.min(crowd * Math.max(this.view.zoom, 1) ** 0.3, LARGEST)) / 2;
+    if (this.sprites && radius === this.radius) return;
+    this.radius = radius;
+    this.sprites = this.styles.map((one) => sprite(one, radius, this.ground));
   }
 
   show(points) {
@@ -64,6 +73,7 @@ export class MapPicture {
     const context = canvas.getContext("2d");
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
+    this.size();
     this.placed = this.inView(width, height);
     const pictured = this.pictures ? this.roomy() : new Set();
     for (const spot of this.placed) if (!pictured.has(spot)) this.dot(context, spot);
@@ -102,7 +112,7 @@ export class MapPicture {
         for (const dy of [-PICTURE, 0, PICTURE]) {
           for (const other of cells.get(key(spot.px + dx, spot.py + dy)) ?? []) {
             const apart = Math.max(Math.abs(other.px - spot.px), Math.abs(other.py - spot.py));
-            if (other !== spot && apart < PICTURE * 0.8) return false;
+            if (other !== spot && apart < PICTURE * 0.75) return false;
           }
         }
       }

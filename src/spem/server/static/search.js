@@ -80,7 +80,10 @@ class Answers {
     if (!this.grid.childElementCount) this.grid.append(...skeletons(6));
     const { k = "24", label } = this.state;
     const path = `api/shapes/${encodeURIComponent(this.id)}/neighbours`;
-    await this.show(await json(path, { k, label }, this.control.signal));
+    // One more, for a shape of the collection is the nearest to itself.
+    const found = await json(path, { k: Number(k) + 1, label }, this.control.signal);
+    const others = found.answers.filter(({ shape }) => shape.id !== this.id).slice(0, Number(k));
+    await this.show({ ...found, answers: others.map((answer, at) => ({ ...answer, rank: at + 1 })) });
   }
 
   async show(found) {
@@ -132,10 +135,9 @@ class Answers {
   }
 
   answer({ rank, distance, shape }) {
-    const near = element("span", { class: "distance" }, element("span", { class: "rank" }, `${rank}`),
-      element("span", {}, distance.toFixed(3)));
-    near.setAttribute("aria-label", `rank ${rank}, distance ${distance.toFixed(3)}`);
-    near.setAttribute("role", "img");
+    const words = `rank ${rank}, distance ${distance.toFixed(3)}`;
+    const near = element("span", { class: "distance", role: "img", "aria-label": words },
+      element("span", { class: "rank" }, `${rank}`), distance.toFixed(3));
     const item = element("li", { class: "answer" }, card(shape, href(`shape/${shape.id}`), near));
     item.append(compareButton(shape, () => this.setState({ compare: shape.id }, { push: true }) ?? this.openComparison(shape.id)));
     return item;
