@@ -22,7 +22,12 @@ _UNREACHABLE = re.compile(
     r"credential|ListRequest|RetryError",
     re.IGNORECASE,
 )
-CONFLICT = re.compile(r"conflict|concurrent|contention|preempted|Too many", re.IGNORECASE)
+# What the database does not raise: mistakes of ours must not pass for damage.
+_NOT_ITS_OWN = (
+    *(KeyboardInterrupt, SystemExit, GeneratorExit, MemoryError, Warning),
+    *(LookupError, TypeError, AttributeError, AssertionError),
+)
+_CONFLICT = re.compile(r"conflict|concurrent|contention|preempted|Too many", re.IGNORECASE)
 # What a filter cannot bring about: bytes that are not what they should be.
 _DAMAGE = re.compile(
     r"not found: |\(IO\)|corrupt|appear to be a lance|local ?file ?system|magic|panic|decod|buffer",
@@ -72,7 +77,7 @@ def told(address: str, *, writing: bool = False, where: str | None = None) -> It
     """
     try:
         yield
-    except (SpemError, KeyboardInterrupt, SystemExit, GeneratorExit, MemoryError):
+    except (SpemError, *_NOT_ITS_OWN):
         raise
     # A panic of the database is a BaseException that no module exports.
     except BaseException as error:
@@ -90,7 +95,7 @@ def _ours(error: BaseException, address: str, *, writing: bool, where: str | Non
     if _FORBIDDEN.search(text):
         verb = "written to" if writing else "read"
         return ParameterError(f"{address}: cannot be {verb} ({said}); check its permissions")
-    if writing and CONFLICT.search(text):
+    if writing and _CONFLICT.search(text):
         msg = f"{address}: others kept writing at the same time ({said}); do the same again"
         return ParameterError(msg)
     if "://" in address and _UNREACHABLE.search(text):

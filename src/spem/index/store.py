@@ -28,6 +28,7 @@ _REMOTE = "://"
 _WORK = "work"
 # Readers hold on to a version for no longer.
 _KEPT = timedelta(hours=1)
+_INSTANT = timedelta(milliseconds=1)
 _PAGE = 1000
 
 
@@ -82,9 +83,10 @@ class Store:
     def _check_layout(self, *, create: bool) -> None:
         """Refuse a database that is no index, or one of a later spem."""
         names = self._names()
-        if MODELS not in names:
-            if names:
-                msg = f"{self.address}: a database of other things ({names[0]}), not an index of spem"
+        if MODELS not in names or not self._is_whole(MODELS):
+            others = [name for name in names if name != MODELS]
+            if others:
+                msg = f"{self.address}: a database of other things ({others[0]}), not an index of spem"
                 raise ReadError(msg)
             if not create:
                 msg = f"{self.address}: no index there; make one with: spem index add {self.address} SHAPES"
@@ -116,12 +118,13 @@ class Store:
 
     def digests(self) -> tuple[str, ...]:
         """Return the digests of the models, in order of name."""
-        return tuple(name.removeprefix(_CODES) for name in self._names() if name.startswith(_CODES))
+        names = [name for name in self._names() if name.startswith(_CODES) and self._is_whole(name)]
+        return tuple(name.removeprefix(_CODES) for name in names)
 
     def save_model(self, model: Model) -> None:
         """Write a model and make its table, unless they are there."""
         name = _CODES + model.digest
-        if name in self._tables or name in self._names():
+        if model.digest in self.digests():
             return
         with self.writing():
             columns = models.models_schema()
@@ -166,7 +169,7 @@ class Store:
 
     def model_records(self) -> list[dict[str, Any]]:
         """Return what the table of models says of each, without the models."""
-        if MODELS not in self._names():
+        if not self.digests():
             return []
         with told(self.address):
             return list(self._open(MODELS).search().select(list(models.FACTS)).to_list())
@@ -251,12 +254,12 @@ class Store:
 
         Readers that still hold an older version can no longer read it.
         """
-        for name in self._names():
+        # the database warns of no time at all
+        age = max(older_than, _INSTANT)
+        for name in (MODELS, *(_CODES + digest for digest in self.digests())):
             with self.writing():
                 # With the lock held no write is going on, so leftovers of writers that were killed may go.
-                self._open(name).optimize(
-                    cleanup_older_than=older_than, delete_unverified=self.folder is not None
-                )
+                self._open(name).optimize(cleanup_older_than=age, delete_unverified=self.folder is not None)
 
     def _open(self, name: str) -> Any:
         """Open a table, once."""
@@ -264,6 +267,15 @@ class Store:
             if name not in self._tables:
                 self._tables[name] = self.database.open_table(name)
             return self._tables[name]
+
+    def _is_whole(self, name: str) -> bool:
+        """Tell a table from what a writer leaves that is killed while it makes one."""
+        try:
+            with told(self.address):
+                self._open(name)
+        except ReadError as error:
+            return "was not found" not in str(error)
+        return True
 
     def _names(self) -> list[str]:
         """List the tables."""
