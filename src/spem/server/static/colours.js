@@ -3,8 +3,8 @@
 const VIRIDIS = ["#440154", "#482475", "#414487", "#355f8d", "#2a788e", "#21918c", "#22a884", "#44bf70", "#7ad151", "#bddf26", "#fde725"];
 const CIVIDIS = ["#00224e", "#123570", "#3b496c", "#575d6d", "#707173", "#8a8678", "#a59c74", "#c3b369", "#e1cc55", "#fee838"];
 const BLUE_RED = ["#0b3c7a", "#2166ac", "#4f97c9", "#9cc9e2", "#d9e8f1", "#f4f2ef", "#fbdcc8", "#f2a884", "#d9654d", "#b2182b", "#75081f"];
-// On a dark ground the middle is dark, so that what is near zero recedes there too.
-const BLUE_RED_DARK = ["#b7dcff", "#86c1f7", "#559fdd", "#3775ad", "#2b4a6c", "#30343b", "#6b3b38", "#a84f45", "#dd6f5c", "#f59a85", "#ffcdbf"];
+// On a dark ground the middle is darker than the ends, so that what is near zero recedes there too.
+const BLUE_RED_DARK = ["#b7dcff", "#8cc4f5", "#62a3df", "#4d86bd", "#5a7893", "#747980", "#96716b", "#bd6a5c", "#df7a66", "#f59a85", "#ffcdbf"];
 
 // Okabe and Ito's, then each the farthest from those before it, as the pictures of the package have them.
 const PARTS = [
@@ -23,6 +23,11 @@ function channels(hex) {
 /** Red, green and blue in one number, in the order of a picture's bytes. */
 function packed([red, green, blue]) {
   return ((255 << 24) | (blue << 16) | (green << 8) | red) >>> 0;
+}
+
+/** A #rrggbb colour as a picture's bytes. */
+export function packedColour(hex) {
+  return packed(channels(hex));
 }
 
 /** Table of 256 colours that goes evenly through some. */
@@ -61,7 +66,7 @@ export function partColour(label) {
 
 /** Table of the colours of parts by label; all but one are faded where one is picked out. */
 export function partTable(count, picked = null) {
-  const table = new Uint32Array(256).fill(packed(channels(NO_PART)));
+  const table = new Uint32Array(256).fill(packedColour(NO_PART));
   const ground = channels(isDark() ? "#262b33" : "#e9ecf0");
   for (let label = 0; label < count; label += 1) {
     const own = channels(partColour(label));

@@ -19,6 +19,7 @@ export async function compareShapes(root, queryId, answerId) {
   const [query, answer] = await Promise.all([loadShape(queryId), loadShape(answerId)]);
   const comparison = new Comparison([queryId, answerId], [query, answer]);
   root.replaceChildren(comparison.root);
+  root.closest("dialog")?.addEventListener("close", () => comparison.destroy(), { once: true });
   comparison.paint();
   bytes("api/words", { query: queryId, answer: answerId, n: WORDS })
     .then((body) => comparison.explain(unpackArrays(body)))

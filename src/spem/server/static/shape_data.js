@@ -77,6 +77,13 @@ export class Geometry {
     }
   }
 
+  /** Of each axis, the place where a slice across it has most nodes. */
+  fullest() {
+    const counts = this.grid.map((extent) => new Int32Array(extent));
+    for (let i = 0; i < this.node.length; i += 1) counts[i % this.ndim][this.node[i]] += 1;
+    return counts.map((count) => count.indexOf(count.reduce((a, b) => Math.max(a, b))));
+  }
+
   /** The node nearest to the middle of all. */
   middle() {
     const mean = new Array(this.ndim).fill(0);

@@ -1,14 +1,17 @@
-/** Drawing a surface by WebGL 2: each of its points takes the colour of the grid of nodes there. */
+/** Drawing a surface by WebGL 2: each of its points takes the colour of the nodes a little below it. */
+
+/** How far below, in voxels: at the surface the nearest nodes lie now nearer and now farther, which shows as moiré. */
+export const DEPTH = 1.5;
 
 const SURFACE = [
   `#version 300 es
   in vec3 place; in vec3 normal; in float lit;
-  uniform mat3 rotation; uniform vec3 middle, spacing, zoom;
+  uniform mat3 rotation; uniform vec3 middle, spacing, zoom; uniform float depth;
   out vec3 cell, facing; out float mark;
   void main() {
     vec3 seen = rotation * ((place - middle) * spacing) * zoom;
     gl_Position = vec4(seen.xy, -seen.z, 1.0);
-    cell = place; facing = rotation * normal; mark = lit;
+    cell = place - depth * normalize(normal) / spacing; facing = rotation * normal; mark = lit;
   }`,
   `#version 300 es
   precision highp float; precision highp sampler3D;
@@ -109,7 +112,8 @@ export class Graphics {
   /** Take the colours of the nodes; `near` gives each cell its node. */
   paint({ level, table, crisp }, near) {
     const { gl, texels, grid } = this;
-    for (let cell = 0; cell < texels.length; cell += 1) texels[cell] = near[cell] < 0 ? 0 : level[near[cell]];
+    this.cells ??= near.reduce((cells, node, cell) => (node < 0 ? cells : (cells.push(cell), cells)), []);
+    for (const cell of this.cells) texels[cell] = level[near[cell]];
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_3D, this.levels);
     if (this.filled) gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, 0, grid[2], grid[1], grid[0], gl.RED, gl.UNSIGNED_BYTE, texels);
@@ -148,6 +152,7 @@ export class Graphics {
     gl.uniform1i(gl.getUniformLocation(this.surface, "colours"), 1);
     gl.uniform1i(gl.getUniformLocation(this.surface, "crisp"), this.crisp ? 1 : 0);
     gl.uniform3fv(gl.getUniformLocation(this.surface, "accent"), accent);
+    gl.uniform1f(gl.getUniformLocation(this.surface, "depth"), DEPTH * Math.min(...view.spacing));
     gl.bindVertexArray(this.bundle);
     gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_INT, 0);
     gl.bindVertexArray(null);

@@ -7,6 +7,7 @@ import { Controls } from "./shape_controls.js";
 import { onTheme } from "./colours.js";
 import { loadParts, loadShape, loadSource } from "./shape_data.js";
 import { downloads, facts, report, similar } from "./shape_details.js";
+import { DEPTH } from "./shape_gl.js";
 import { Profile } from "./shape_profile.js";
 import { Stage } from "./shape_stage.js";
 import { readView, writtenRho } from "./shape_state.js";
@@ -52,14 +53,14 @@ class ShapePage {
     this.figure = element("figure", { class: "shape-card shape-figure" }, this.stage.root, this.bar.root, this.readout, this.caption);
     this.pointTitle = heading("Field against ρ");
     this.pointNote = element("p", { class: "shape-note" });
-    const point = element("section", { class: "shape-card" }, this.pointTitle, this.pointNote, this.profile.root);
+    const point = element("section", { class: "shape-card shape-point" }, this.pointTitle, this.pointNote, this.profile.root);
     this.comparison = element("section", { class: "shape-card shape-compared", hidden: true });
     this.files = element("div");
     return element(
       "article",
       { class: "shape" },
       element("header", { class: "shape-head" }, element("h1", {}, this.card.name), element("p", {}, facts(this.card))),
-      element("div", { class: "shape-main" }, this.figure, element("div", { class: "shape-side" }, this.controls.root, point)),
+      element("div", { class: "shape-main" }, this.controls.root, this.figure, point),
       this.comparison,
       element("section", {}, heading("Similar shapes"), ...similar(this.id)),
       element("div", { class: "shape-more" },
@@ -113,8 +114,7 @@ class ShapePage {
   }
 
   cut(axis, place) {
-    const middle = this.geometry.place(this.geometry.middle());
-    const slice = Array.from(this.view.slice ?? middle);
+    const slice = [...(this.view.slice ?? this.geometry.fullest())];
     slice[axis] = place;
     this.change({ slice: slice.join(",") }, { push: false });
   }
@@ -190,6 +190,7 @@ class ShapePage {
     this.profile.move(this.view.place);
     if (this.view.show === "field") this.controls.moveTo(this.view.place);
     if (!this.colour()) {
+      if (!this.bar.table) this.paintMeanwhile();
       this.caption.textContent = this.view.show === "source" ? "Solving for the source…" : "Dividing the shape into parts…";
       return;
     }
@@ -197,10 +198,17 @@ class ShapePage {
     this.bar.show(this.colouring);
     this.hover(-1);
     const solid = this.geometry.ndim === 3;
-    this.caption.textContent = solid ? "The surface has the values of the nodes just inside it; on the surface itself the field is 1. Slices show the inside." : "";
+    this.caption.textContent = solid ? `The surface has the values ${DEPTH} voxels below it, as on it the field is 1 by definition.` : "";
     const { title, low, high, labels } = this.colouring;
     const range = labels ? labels.map(({ label, size }) => `part ${label + 1} ${shown(100 * size)} %`).join(", ") : `from ${shown(low)} to ${shown(high)}`;
     this.stage.describe(`${solid ? "Surface" : "Picture"} of ${this.card.name}. ${title}, ${range}. Arrow keys ${solid ? "turn it" : "choose a point"}.`);
+  }
+
+  /** Show the field until what was asked for is here. */
+  paintMeanwhile() {
+    colourField(this.colouring, this.fields, this.view.place, this.view.fit);
+    this.stage.paint(this.colouring);
+    this.bar.show(this.colouring);
   }
 
   savePicture() {
@@ -214,18 +222,20 @@ class ShapePage {
     this.comparison.replaceChildren();
     this.beside?.destroy();
     this.beside = null;
-    if (other === null) return;
+    if (other === null) return undefined;
     const close = element("button", { type: "button", class: "button small", onclick: () => this.change({ compare: null }) }, "Close");
     const body = element("div", {}, element("p", { class: "shape-note", role: "status" }, "Loading both shapes…"));
     this.comparison.append(element("div", { class: "shape-compared-head" }, element("h2", {}, "Side by side"), close), body);
     try {
       const { compareShapes } = await import("./shape_compare.js");
       const beside = await compareShapes(body, this.id, other);
-      if (this.view.compare === other) this.beside = beside;
-      else beside.destroy();
+      if (this.view.compare !== other) return beside.destroy();
+      this.beside = beside;
+      this.comparison.scrollIntoView({ block: "nearest" });
     } catch (error) {
       body.replaceChildren(element("p", { class: "shape-note" }, error.message));
     }
+    return undefined;
   }
 
   destroy() {

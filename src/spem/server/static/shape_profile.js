@@ -64,7 +64,7 @@ export class Profile {
     }
     const middle = (BOX.left + BOX.right) / 2;
     made.push(svg("text", { x: middle, y: HEIGHT - 6, "text-anchor": "middle", class: "chart-name" }, "screening length ρ, in units of the file"));
-    made.push(svg("text", { x: 10, y: (BOX.top + BOX.bottom) / 2, "text-anchor": "middle", class: "chart-name" }, "v"));
+    made.push(svg("text", { x: 10, y: this.y(0.625) + 4, "text-anchor": "middle", class: "chart-name" }, "v"));
     return made;
   }
 

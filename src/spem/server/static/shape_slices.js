@@ -1,7 +1,8 @@
 /** Three orthogonal slices of a solid, each with a slider for its place. */
 
 import { element } from "./dom.js";
-import { dot, fitCanvas, Raster, ring } from "./shape_raster.js";
+import { packedColour } from "./colours.js";
+import { dot, fitCanvas, pageColour, Raster, ring } from "./shape_raster.js";
 
 const MARGIN = 10;
 
@@ -12,6 +13,7 @@ class Slice {
     // The first of the other axes goes right and the second up, as x and y do.
     [this.across, this.upward] = [0, 1, 2].filter((other) => other !== axis);
     this.raster = new Raster(geometry.grid[this.across], geometry.grid[this.upward]);
+    this.shadow = new Raster(geometry.grid[this.across], geometry.grid[this.upward]);
     const name = geometry.header.axes?.[axis] ?? `axis ${axis}`;
     this.canvas = element("canvas", { class: "shape-canvas", role: "application", tabindex: 0 });
     this.value = element("output", {});
@@ -85,6 +87,20 @@ class Slice {
     this.canvas.setAttribute("aria-label", `Slice across ${this.name} at ${place} of ${geometry.grid[axis] - 1}`);
   }
 
+  /** Colour the slice, and what of the shape lies before and behind it. */
+  paint(colouring) {
+    this.raster.paint(colouring);
+    if (this.tone === pageColour("--line")) return;
+    this.tone = pageColour("--line");
+    const { geometry, across, upward } = this;
+    const { width, height } = this.shadow.canvas;
+    for (let i = 0; i < geometry.n; i += 1) {
+      const place = geometry.place(i);
+      this.shadow.node[(height - 1 - place[upward]) * width + place[across]] = 0;
+    }
+    this.shadow.paint({ level: [0], table: [packedColour(this.tone)] });
+  }
+
   draw(node, marks) {
     this.node = node;
     if (!fitCanvas(this.canvas)) return;
@@ -100,7 +116,9 @@ class Slice {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
     context.imageSmoothingEnabled = false;
-    context.drawImage(this.raster.canvas, left - right / 2, bottom - tall * scale + up / 2, wide * scale, tall * scale);
+    const place = [left - right / 2, bottom - tall * scale + up / 2, wide * scale, tall * scale];
+    context.drawImage(this.shadow.canvas, ...place);
+    context.drawImage(this.raster.canvas, ...place);
     this.drawOver(context, marks);
   }
 
@@ -138,18 +156,18 @@ export class Slices {
   /** Colour the slices. */
   paint(colouring) {
     this.colouring = colouring;
-    for (const { raster } of this.slices) raster.paint(colouring);
+    for (const slice of this.slices) slice.paint(colouring);
     this.draw();
   }
 
   /** Show a node and marks, and cut at three places. */
   show({ node = this.node, marks = this.marks, places = null }) {
     Object.assign(this, { node, marks });
-    const middle = this.geometry.place(this.geometry.middle());
+    const fullest = this.geometry.fullest();
     for (const slice of this.slices) {
       const before = slice.place;
-      slice.cut(places?.[slice.axis] ?? slice.place ?? middle[slice.axis]);
-      if (slice.place !== before && this.colouring) slice.raster.paint(this.colouring);
+      slice.cut(places?.[slice.axis] ?? slice.place ?? fullest[slice.axis]);
+      if (slice.place !== before && this.colouring) slice.paint(this.colouring);
     }
     this.draw();
   }
