@@ -16,7 +16,14 @@ from starlette.responses import Response
 from spem import __version__
 from spem.errors import SpemError
 from spem.index.index import Index
-from spem.server import routes_jobs, routes_service, routes_shapes, routes_views
+from spem.server import (
+    routes_collection,
+    routes_files,
+    routes_jobs,
+    routes_service,
+    routes_shapes,
+    routes_views,
+)
 from spem.server.middleware import Doorkeeper
 from spem.server.options import ServerOptions
 from spem.server.pages import page_routes
@@ -75,7 +82,15 @@ def create_app(index: Index, options: ServerOptions | None = None) -> FastAPI:
         redirect_slashes=False,
     )
     app.state.services = services
-    for routes in (routes_service, routes_shapes, routes_views, routes_jobs):
+    # The files of a shape come last: their route has a place for any name.
+    for routes in (
+        routes_service,
+        routes_collection,
+        routes_shapes,
+        routes_views,
+        routes_jobs,
+        routes_files,
+    ):
         app.include_router(routes.router)
     app.include_router(page_routes())
     app.add_middleware(Doorkeeper, services=services, names=_names(chosen))
