@@ -13,7 +13,7 @@ from spem.embedding.boundary_contexts import boundary_contexts, context_basis, m
 from spem.embedding.boundary_response import boundary_response
 from spem.errors import ShapeError
 from spem.fields.boundary.patches import divide_points
-from spem.fields.boundary.sources import point_sources
+from spem.fields.boundary.sources import Sources, point_sources
 from spem.fields.operator import assemble
 from spem.shapes.shape import Shape
 
@@ -72,6 +72,36 @@ def source_features(
     >>> source_features(disk(radius=20.0, spacing=1.0), Settings(features="spem", n_maps=44))[0].shape
     (200, 44)
     """
+    outer = contour_arcs(shape, settings, n_patches)
+    shares = boundary_contexts(boundary_response(outer, rho * shape.size))
+    basis, signs = _basis(settings.n_maps)
+    values = np.sqrt(shares) @ basis
+    return ((np.vstack([values, values * signs]) if mirrored else values).astype(np.float32),)
+
+
+def contour_arcs(shape: Shape, settings: Settings, n_patches: int = N_PATCHES) -> Sources:
+    """Cut the contours of a silhouette into arcs, and return those of the longest.
+
+    Parameters
+    ----------
+    shape
+        A shape of two dimensions.
+    settings
+        Boundary model.
+    n_patches
+        As for `source_features`.
+
+    Raises
+    ------
+    ShapeError
+        When the shape is not of two dimensions.
+
+    Examples
+    --------
+    >>> from spem.shapes.synthetic import annulus
+    >>> contour_arcs(annulus(0.5, 1.0, 0.05), Settings(features="sources")).n_sources
+    66
+    """
     if shape.ndim != 2:
         msg = f"{shape.name}: features 'sources' are of silhouettes; this shape has {shape.ndim} dimensions"
         raise ShapeError(msg)
@@ -80,11 +110,7 @@ def source_features(
     # each contour takes an arc: where holes took half of them little would be left to divide the longest
     count = min(n_patches if 2 * n_contours <= n_patches else n_contours + n_patches, points.n_sources)
     arcs = divide_points(points, count)
-    outer = arcs.select(np.flatnonzero(arcs.contour == 0))
-    shares = boundary_contexts(boundary_response(outer, rho * shape.size))
-    basis, signs = _basis(settings.n_maps)
-    values = np.sqrt(shares) @ basis
-    return ((np.vstack([values, values * signs]) if mirrored else values).astype(np.float32),)
+    return arcs.select(np.flatnonzero(arcs.contour == 0))
 
 
 @lru_cache(maxsize=4)
