@@ -7,7 +7,7 @@
  * `update(state)` is called if the page gave one, else it is drawn again. `destroy()` is called when it is left.
  */
 
-import { announce, element, notice } from "./dom.js";
+import { announce, element } from "./dom.js";
 
 const routes = [];
 let current = null;
@@ -113,7 +113,9 @@ async function draw(moved) {
     else page?.destroy?.();
   } catch (error) {
     if (ticket !== turn || error.name === "AbortError") return;
-    root.replaceChildren(notice("This page could not be drawn", error.message));
+    const title = error.status === 404 ? "This is not here" : "This page could not be drawn";
+    document.title = `${title} · spem`;
+    root.replaceChildren(element("h1", {}, title), element("p", { class: "lead" }, error.message));
   }
   if (ticket === turn && moved) arrive(root);
 }
