@@ -12,6 +12,7 @@ import spem
 from spem.errors import ParameterError, ShapeError
 from spem.server.arrays import pack_arrays
 from spem.server.views import VIEWS
+from spem.server.views.options import coarser_shape
 from spem.server.views.outline import mesh_of
 
 view = VIEWS["geometry"]
@@ -98,6 +99,16 @@ def test_large_shapes_are_shown_coarser():
     assert len(arrays["node"]) == pytest.approx(1000, rel=0.02)
     points = np.asarray(header["origin"]) + arrays["contour"] * np.asarray(header["spacing"])
     np.testing.assert_allclose(np.linalg.norm(points, axis=1), 40.0, rtol=0.01)
+
+
+def test_all_views_have_the_same_coarse_grid():
+    """Views of equal shapes, unpacked anew each time, have one grid; another shape has its own."""
+    one, same, other = (spem.synthetic.disk(radius=r, spacing=1.0) for r in (20.0, 20.0, 21.0))
+    assert coarser_shape(one, 200) is coarser_shape(same, 200)
+    assert coarser_shape(one, 200) is not coarser_shape(other, 200)
+    for name, key in (("field", "basis"), ("parts", "node_part")):
+        _, arrays = VIEWS[name](one, {"max_nodes": 200})
+        assert len(arrays[key]) == len(view(one, {"max_nodes": 200})[1]["node"])
 
 
 @pytest.mark.parametrize("shape", [spem.Shape.from_mask(np.ones(9)), spem.Shape.from_mask(np.ones((3,) * 4))])

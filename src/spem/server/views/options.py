@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from hashlib import sha256
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -71,6 +74,8 @@ def shown_shape(shape: Shape, options: Options) -> Shape:
 def coarser_shape(shape: Shape, n_nodes: int) -> Shape:
     """Return a shape of so many nodes; itself where it has no more, or would lose its thin parts.
 
+    The last ones are kept, for several views of a shape are asked for in a row.
+
     Examples
     --------
     >>> coarser_shape(Shape.from_mask(np.ones((40, 40))), 400).n_nodes
@@ -78,11 +83,38 @@ def coarser_shape(shape: Shape, n_nodes: int) -> Shape:
     """
     if shape.n_nodes <= n_nodes:
         return shape
+    coarse = _resampled(_Wanted(_digest(shape), n_nodes, shape))
+    return shape if coarse is None else coarse
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """A shape on another grid; shapes of equal digest are the same."""
+
+    digest: bytes
+    n_nodes: int
+    shape: Shape = field(compare=False)
+
+
+@lru_cache(maxsize=4)
+def _resampled(wanted: _Wanted) -> Shape | None:
+    """Return the coarser shape, None where too much of it would be lost."""
     try:
-        coarse = to_voxel_budget(shape, n_nodes)
+        coarse = to_voxel_budget(wanted.shape, wanted.n_nodes)
     except ShapeError:
-        return shape
-    return coarse if abs(coarse.volume / shape.volume - 1) < _VOLUME_CHANGE else shape
+        return None
+    return coarse if abs(coarse.volume / wanted.shape.volume - 1) < _VOLUME_CHANGE else None
+
+
+def _digest(shape: Shape) -> bytes:
+    """Return what tells shapes apart: name, grid, inside, cuts and surface."""
+    cuts, surface = shape.cuts, shape.surface
+    arrays = [np.packbits(shape.mask), cuts.voxel, cuts.direction, cuts.fraction]
+    if surface is not None:
+        arrays += [surface.vertices, surface.faces]
+    sizes = [array.shape for array in arrays]
+    said = repr((shape.name, shape.mask.shape, shape.spacing, shape.origin, sizes)).encode()
+    return sha256(said + b"".join(array.tobytes() for array in arrays)).digest()
 
 
 def plain_length(rho: float) -> float | str:
