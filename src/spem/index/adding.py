@@ -19,8 +19,8 @@ from spem.codes.work import clear_work
 from spem.errors import ModelError, ParameterError, ReadError
 from spem.index.batches import Batches
 from spem.index.changes import Known, Plan, place, plan
-from spem.index.encoding import Describe, Described, Item
-from spem.index.executors import Executor, LocalExecutor
+from spem.index.encoding import Describe, Described
+from spem.index.executors import Executor, Item, LocalExecutor
 from spem.index.naming import Labelling
 from spem.index.store import Store
 from spem.index.training import Drafts, Finish, Make, learn

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
+import logging
 import platform
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from queue import Empty, Queue
 from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
 from spem.codes.workers import one_line
 from spem.errors import ClusterError
-from spem.index.encoding import Item
+from spem.index.executors import Item
 from spem.index.extra import require
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 # Seconds within which a scheduler must answer, and for which one may have no worker.
-CONNECT, IDLE = 8.0, 60.0
+CONNECT, IDLE = 5.0, 60.0
 # Tasks handed out for each thread: one runs, the next is there when it is done.
 _AHEAD = 2
 # Seconds between two looks at the cluster while nothing comes.
@@ -98,6 +101,7 @@ class _Run:
     address: str
     idle: float
     shared: tuple[Any, ...]
+    done: Queue[Any] = field(default_factory=Queue)
 
     def outcomes(self, tasks: Sequence[Any], *, alone: bool) -> Iterator[tuple[Any, tuple[Any, str] | None]]:
         """Yield each task with its outcome, None where its workers died; few are on their way at a time."""
@@ -113,35 +117,43 @@ class _Run:
                     more = task is not _END
                     if more:
                         pending[self._submit(task)] = task
-                for future in self._finished(pending):
+                for future in self._finished():
                     yield pending.pop(future), self._outcome(future)
                 if time.monotonic() - since > self.idle:
                     msg = f"{self.address}: no worker for {self.idle:g} s; start some, give the command again"
                     raise ClusterError(msg)
         finally:
-            if pending:
+            # the scheduler may be gone, of which more is told elsewhere
+            with suppress(OSError, TimeoutError, RuntimeError, ValueError):
                 self.client.cancel(list(pending), force=True)
 
     def _submit(self, task: Any) -> Any:
-        """Hand a task out."""
-        return self.client.submit(_on_worker, *self.shared, _absolute(task), pure=False)
+        """Hand a task out; it comes to the queue when it is done."""
+        future = self.client.submit(_on_worker, *self.shared, _absolute(task), pure=False)
+        future.add_done_callback(self.done.put)
+        return future
 
     def _n_threads(self) -> int:
         """Return how many tasks the workers run at once."""
         try:
             return sum(self.client.nthreads().values())
         except (TimeoutError, OSError, RuntimeError, ValueError) as error:
-            msg = f"{self.address}: the scheduler is gone; what was written stays: give the command again"
-            raise ClusterError(msg) from error
+            raise self._lost() from error
 
-    def _finished(self, pending: dict[Any, Any]) -> list[Any]:
+    def _lost(self) -> ClusterError:
+        """Say that the cluster is gone."""
+        msg = f"{self.address}: the scheduler is gone; what was written stays: give the command again"
+        return ClusterError(msg)
+
+    def _finished(self) -> list[Any]:
         """Wait a little, and return what is done by then."""
-        if pending:
-            try:
-                self.distributed.wait(list(pending), timeout=_LOOK, return_when="FIRST_COMPLETED")
-            except TimeoutError:
-                return []
-        return [future for future in pending if future.status != "pending"]
+        found: list[Any] = []
+        try:
+            found.append(self.done.get(timeout=_LOOK))
+            while True:
+                found.append(self.done.get_nowait())
+        except Empty:
+            return found
 
     def _outcome(self, future: Any) -> tuple[Any, str] | None:
         """Return what a task came to."""
@@ -149,6 +161,8 @@ class _Run:
             result: tuple[Any, str] = future.result()
         except self.distributed.KilledWorker:
             return None
+        except CancelledError as error:
+            raise self._lost() from error
         except Exception as error:  # noqa: BLE001
             return None, one_line(error)
         return result
@@ -163,15 +177,27 @@ def _connected(distributed: Any, address: str) -> Iterator[Any]:
     if not address.startswith(("tcp://", "tls://")):
         msg = f"cluster {address}: expected the address of a Dask scheduler, such as tcp://host:8786"
         raise ClusterError(msg)
+    with _silenced(logging.getLogger("distributed")):
+        try:
+            client = distributed.Client(address, timeout=CONNECT, set_as_default=False)
+        except (TimeoutError, OSError, ValueError, TypeError) as error:
+            msg = f"{address}: no Dask scheduler answers there; start one with: dask scheduler"
+            raise ClusterError(msg) from error
+        try:
+            yield client
+        finally:
+            client.close(timeout=CONNECT)
+
+
+@contextmanager
+def _silenced(log: logging.Logger) -> Iterator[None]:
+    """Keep a log quiet; what Dask says in many lines of lost connections is told in one instead."""
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
     try:
-        client = distributed.Client(address, timeout=CONNECT, set_as_default=False)
-    except (TimeoutError, OSError, ValueError, TypeError) as error:
-        msg = f"{address}: no Dask scheduler answers there; start one with: dask scheduler"
-        raise ClusterError(msg) from error
-    try:
-        yield client
+        yield
     finally:
-        client.close(timeout=CONNECT)
+        log.setLevel(level)
 
 
 def _check_workers(client: Any, address: str, tasks: Sequence[Any]) -> None:

@@ -15,6 +15,7 @@ from spem.codes.settings import Settings
 from spem.codes.sources import Source, read_shapes, source_hash, source_name, source_path
 from spem.codes.workers import one_line
 from spem.errors import ReadError, SpemError
+from spem.index.executors import Item
 from spem.index.row import Row, pack, row_id
 from spem.plots.thumbnails import thumbnail
 from spem.shapes.shape import Shape
@@ -56,22 +57,6 @@ class Described:
 
     rows: tuple[Row, ...]
     failures: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Item:
-    """A source to be encoded.
-
-    Parameters
-    ----------
-    key
-        SHA-256 of its content, in hex, when it was listed.
-    source
-        The file or shape.
-    """
-
-    key: str
-    source: Source
 
 
 def draft(

@@ -4,12 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from spem.codes.workers import run_all
 
+if TYPE_CHECKING:
+    from spem.codes.sources import Source
+
 T = TypeVar("T")
 R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class Item:
+    """A source to be encoded.
+
+    Parameters
+    ----------
+    key
+        SHA-256 of its content, in hex, when it was listed.
+    source
+        The file or shape.
+    """
+
+    key: str
+    source: Source
 
 
 class Executor(Protocol):

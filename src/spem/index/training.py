@@ -22,8 +22,8 @@ from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.codes.work import Work
 from spem.errors import ReadError, SpemError
-from spem.index.encoding import Described, Draft, Item, draft, finish
-from spem.index.executors import Executor
+from spem.index.encoding import Described, Draft, draft, finish
+from spem.index.executors import Executor, Item
 from spem.index.row import Row
 
 Progress = Callable[[str, int, int], None]
