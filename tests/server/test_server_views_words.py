@@ -14,6 +14,7 @@ from spem.errors import ModelError, ParameterError, ReadError
 from spem.index.row import pack
 from spem.retrieval.distances import correlation_distance
 from spem.server.arrays import pack_arrays
+from spem.server.tasks import TASKS
 from spem.server.views.words import kind_of, pack_pair, unpack_pair, view_words
 
 
@@ -103,3 +104,14 @@ def test_shapes_of_another_dimension_are_refused(stars):
 def test_kinds_are_told_in_words_that_stand_alone(kind):
     """No text refers to the one before."""
     assert "the same" not in kind_of(kind)
+
+
+def test_workers_know_the_task(stars, tmp_path):
+    """Of two packed shapes and the file of a model a worker makes the same reply."""
+    (one, two, _), model = stars
+    model.save(tmp_path / "model.spem")
+    header = {"model_file": str(tmp_path / "model.spem"), "n": 3, "name": "star"}
+    found, arrays = TASKS["words"](header, pack_pair(pack(one), pack(two)))
+    expected, points = view_words(one, two, model, {"n": 3})
+    assert [word["word"] for word in found["words"]] == [word["word"] for word in expected["words"]]
+    np.testing.assert_allclose(arrays["query_points"], points["query_points"], atol=1e-4)

@@ -73,6 +73,13 @@ def view(header: dict[str, Any], payload: bytes) -> Reply:
     return VIEWS[header["view"]](unpack(payload, str(header.get("name", "shape"))), options)
 
 
+def words(header: dict[str, Any], payload: bytes) -> Reply:
+    """Tell why two packed shapes are alike, by the model in ``model_file``; the rest are options."""
+    from spem.server.views.words import unpack_pair, view_words
+
+    return view_words(*unpack_pair(payload), _model(header["model_file"]), header)
+
+
 def pack_rows(rows: list[Row]) -> Reply:
     """Return rows as a header and arrays."""
     listed, arrays = [], {}
@@ -116,7 +123,7 @@ def unpack_rows(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -
 
 
 #: What a worker can do, by name.
-TASKS: Mapping[str, Task] = {"encode": encode, "view": view}
+TASKS: Mapping[str, Task] = {"encode": encode, "view": view, "words": words}
 
 
 def _rows(file: Path, model: Model, shown: str, header: Mapping[str, Any]) -> list[Row]:

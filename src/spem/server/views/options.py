@@ -22,7 +22,7 @@ Reply: TypeAlias = tuple[dict[str, Any], dict[str, NDArray[Any]]]
 MOST_NODES = 60_000
 _LIMITS = (100, 2_000_000)
 # Where limbs or sheets fall between the nodes of a coarser grid, more of the volume is lost.
-_VOLUME_CHANGE = 0.1
+_VOLUME_CHANGE = 0.25
 
 
 def whole_option(options: Options, name: str, default: int, least: int, most: int) -> int:
@@ -109,7 +109,7 @@ def _resampled(wanted: _Wanted) -> Shape | None:
 def _digest(shape: Shape) -> bytes:
     """Return what tells shapes apart: name, grid, inside, cuts and surface."""
     cuts, surface = shape.cuts, shape.surface
-    arrays = [np.packbits(shape.mask), cuts.voxel, cuts.direction, cuts.fraction]
+    arrays: list[NDArray[Any]] = [np.packbits(shape.mask), cuts.voxel, cuts.direction, cuts.fraction]
     if surface is not None:
         arrays += [surface.vertices, surface.faces]
     sizes = [array.shape for array in arrays]
