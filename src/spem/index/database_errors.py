@@ -18,9 +18,16 @@ _FORBIDDEN = re.compile(
     r"permission denied|read-only file system|access ?denied|forbidden|os error (13|30)\b", re.IGNORECASE
 )
 _UNREACHABLE = re.compile(
-    r"error sending request|connect|dns|timed? ?out|NoSuchBucket|InvalidAccessKeyId|SignatureDoesNotMatch|"
-    r"credential|ListRequest|RetryError",
+    r"connect|dns|timed? ?out|NoSuchBucket|AccessKey|Signature|credential|Request|Retry|provider",
     re.IGNORECASE,
+)
+# What says most in the many words of object storage, best first.
+_REASONS = (
+    re.compile(r"<Message>(.*?)</Message>"),
+    re.compile(r'message: "([^"]+)"'),
+    re.compile(r"(Failed to get \w+ credentials)"),
+    re.compile(r"(status: \d+)"),
+    re.compile(r"(No object store provider found for scheme: '\w*')"),
 )
 # What the database does not raise: mistakes of ours must not pass for damage.
 _NOT_ITS_OWN = (
@@ -87,7 +94,11 @@ def told(address: str, *, writing: bool = False, where: str | None = None) -> It
 def _ours(error: BaseException, address: str, *, writing: bool, where: str | None) -> SpemError:
     """Choose the error that says the same."""
     text, said = str(error), brief(error)
-    if where is not None and isinstance(error, (ValueError, RuntimeError)) and not _DAMAGE.search(text):
+    far = "://" in address and _UNREACHABLE.search(text) is not None
+    if far:
+        said = next((found[1] for pattern in _REASONS if (found := pattern.search(text))), said)
+    is_filter = where is not None and isinstance(error, (ValueError, RuntimeError))
+    if is_filter and not far and not _DAMAGE.search(text):
         msg = f"where={where!r}: no filter of rows ({said}); write SQL such as label = 'cat' AND volume > 2"
         return ParameterError(msg)
     if _FULL.search(text):
@@ -98,7 +109,6 @@ def _ours(error: BaseException, address: str, *, writing: bool, where: str | Non
     if writing and _CONFLICT.search(text):
         msg = f"{address}: others kept writing at the same time ({said}); do the same again"
         return ParameterError(msg)
-    if "://" in address and _UNREACHABLE.search(text):
-        msg = f"{address}: cannot be reached ({said}); check address, region and keys"
-        return ReadError(msg)
+    if far:
+        return ReadError(f"{address}: cannot be reached ({said}); check address, region and keys")
     return ReadError(f"{address}: damaged ({said}); see: spem index check {address}")

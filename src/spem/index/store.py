@@ -19,7 +19,7 @@ from spem.index.extra import require
 from spem.index.filters import to_sql
 from spem.index.locking import one_writer
 from spem.index.row import Row
-from spem.index.schema import LAYOUT, LIGHT, layout_of, schema, to_row
+from spem.index.schema import LAYOUT, LIGHT, layout_of, models_schema, schema, to_row
 
 MODELS = "models"
 _CODES = "codes-"
@@ -127,7 +127,7 @@ class Store:
         if model.digest in self.digests():
             return
         with self.writing():
-            columns = models.models_schema()
+            columns = models_schema()
             table = self.database.create_table(MODELS, schema=columns, exist_ok=True)
             # the model first: a table of codes without one would be of no use
             merge = table.merge_insert("digest").when_not_matched_insert_all()
@@ -166,6 +166,13 @@ class Store:
             raise ModelError(msg)
         with told(self.address):
             return self._open(name)
+
+    def table_at(self, digest: str, version: int) -> Any:
+        """Open the table of a model as it was at a version."""
+        with told(self.address):
+            table = self.database.open_table(_CODES + digest)
+            table.checkout(version)
+        return table
 
     def model_records(self) -> list[dict[str, Any]]:
         """Return what the table of models says of each, without the models."""

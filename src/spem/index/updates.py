@@ -10,6 +10,7 @@ from typing import Any
 
 from spem.errors import ParameterError, ReadError
 from spem.index.changes import Known, Plan, place
+from spem.index.database_errors import told
 from spem.index.extra import require
 from spem.index.filters import any_of, to_sql
 from spem.index.row import Row
@@ -18,8 +19,6 @@ from spem.index.store import Store
 
 # Rows that one filter names.
 _AT_ONCE = 2000
-# On object storage others may change a row between reading and writing it.
-_ATTEMPTS = 5
 _PATHS = ("id", "hash", "path", "copies")
 
 
@@ -42,24 +41,14 @@ def write(store: Store, digest: str, rows: Sequence[Row]) -> None:
     ParameterError
         When the codes have another length than the model's, or nothing can be written.
     """
-    table = store.table(digest)
-    n_code = table.schema.field("vector").type.list_size
+    n_code = _n_code(store.table(digest))
     odd = next((row for row in rows if len(row.code) != n_code), None)
     if odd is not None:
         msg = f"{odd.name}: a code of {len(odd.code)} numbers, those of model {digest} have {n_code}"
         raise ParameterError(msg)
-    for _ in range(_ATTEMPTS if rows else 0):
-        with store.writing():
-            there = _read(store, digest, [row.id for row in rows])
-            merged = _merged([*there.values(), *rows])
-            written = [_stored(store, merged[row_id]) for row_id in dict.fromkeys(row.id for row in rows)]
-            merge = table.merge_insert("id").when_matched_update_all().when_not_matched_insert_all()
-            merge.execute(to_table(written, n_code))
-            if store.folder is not None:
-                return
-        found = _read(store, digest, list(merged))
-        if all(set(_paths(merged[key])) <= set(_paths(row)) for key, row in found.items()):
-            return
+    todo = list(rows)
+    while todo:
+        todo = _written(store, digest, todo)
 
 
 def known(store: Store, digest: str) -> list[Known]:
@@ -106,7 +95,7 @@ def ids_of(store: Store, digest: str, names: Sequence[str]) -> list[str]:
     ReadError
         When one is no row.
     """
-    ids = set(_read(store, digest, names))
+    ids = set(_read(store, store.table(digest), names))
     others, by_place = [name for name in names if name not in ids], defaultdict(list)
     if others:
         for row in store.rows(digest):
@@ -143,7 +132,7 @@ def annotate(store: Store, digest: str, change: Callable[[Row], Row], ids: Seque
     changed = 0
     for some in _batches(list(dict.fromkeys(ids))):
         with store.writing():
-            before = _read(store, digest, some)
+            before = _read(store, store.table(digest), some)
             after = {key: change(row) for key, row in before.items()}
             records = [
                 {"id": key, "label": row.label, "metadata": sorted(row.metadata.items())}
@@ -155,11 +144,40 @@ def annotate(store: Store, digest: str, change: Callable[[Row], Row], ids: Seque
     return changed
 
 
-def _read(store: Store, digest: str, ids: Iterable[str]) -> dict[str, Row]:
+def _written(store: Store, digest: str, rows: Sequence[Row]) -> list[Row]:
+    """Write rows, and return those to be written again since another changed them in between."""
+    table = store.table(digest)
+    ids = list(dict.fromkeys(row.id for row in rows))
+    with store.writing():
+        version = table.version
+        merged = _merged([*_read(store, table, ids).values(), *rows])
+        data = to_table([_stored(store, merged[row_id]) for row_id in ids], _n_code(table))
+        result = (
+            table.merge_insert("id").when_matched_update_all().when_not_matched_insert_all().execute(data)
+        )
+    if result.version == version + 1:
+        return []
+    # On object storage nobody is alone: what was there just before may not be what was read.
+    before = _read(store, store.table_at(digest, result.version - 1), ids)
+    return [
+        _merged([row, merged[row_id]])[row_id]
+        for row_id, row in before.items()
+        if not set(map(place, _paths(row))) <= set(map(place, _paths(merged[row_id])))
+    ]
+
+
+def _n_code(table: Any) -> int:
+    """Return the length of the codes of a table."""
+    return int(table.schema.field("vector").type.list_size)
+
+
+def _read(store: Store, table: Any, ids: Sequence[str]) -> dict[str, Row]:
     """Read rows by their ids, without codes, pictures and shapes."""
     rows: dict[str, Row] = {}
-    for some in _batches(list(ids)):
-        rows |= {row.id: row for row in store.rows(digest, any_of("id", some), columns=LIGHT)}
+    for some in _batches(ids):
+        with told(store.address):
+            records = table.search().where(any_of("id", some)).select(list(LIGHT)).to_list()
+        rows |= {row.id: row for row in map(store.row, records)}
     return rows
 
 
@@ -202,7 +220,7 @@ def _update(store: Store, digest: str, records: Sequence[Mapping[str, Any]], col
         return
     pa = require("pyarrow")
     table = store.table(digest)
-    wanted = schema(table.schema.field("vector").type.list_size)
+    wanted = schema(_n_code(table))
     part = pa.schema([wanted.field(name) for name in (*columns, "added")])
     now = datetime.now(UTC)
     data = pa.Table.from_pylist([{**record, "added": now} for record in records], schema=part)
