@@ -14,7 +14,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
 from spem import __version__
-from spem.errors import SpemError
+from spem.errors import ParameterError, SpemError
 from spem.index.index import Index
 from spem.server import (
     routes_collection,
@@ -24,6 +24,7 @@ from spem.server import (
     routes_shapes,
     routes_views,
 )
+from spem.server.logs import fail
 from spem.server.middleware import Doorkeeper
 from spem.server.options import ServerOptions
 from spem.server.pages import page_routes
@@ -127,5 +128,8 @@ async def _on_values(_: Request, error: Exception) -> Response:
 
 
 async def _on_spem(_: Request, error: Exception) -> Response:
-    """Answer an error of the library, which is on what was asked for."""
-    return error_response(422, str(error))
+    """Answer an error of the library: on what was asked for, or of an index that cannot be read."""
+    if isinstance(error, ParameterError):
+        return error_response(422, str(error))
+    fail("the index cannot be read", error)
+    return error_response(503, "the index cannot be read just now; come again later", {"Retry-After": "5"})

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-import threading
 import time
-from collections import OrderedDict
-from collections.abc import Callable, Hashable
-from dataclasses import dataclass
-from typing import Any, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.index.answers import Answers, Found
+from spem.index.comparison import in_memory
+from spem.index.extra import require
 from spem.index.index import Index
 from spem.index.row import Row
-from spem.index.schema import LIGHT
+from spem.index.schema import LIGHT, standardised_codes, to_row
+from spem.index.searching import EXACT_ROWS
+from spem.index.snapshot import Snapshot
 from spem.server.cards import card, ranking
 from spem.server.queries import Filters, Sort, is_digest, is_id, quoted
 from spem.server.refusals import Refusal
-
-Value = TypeVar("Value")
+from spem.server.remembered import Remembered
 
 # Seconds for which what changes only when somebody writes is taken as it was.
 FRESH = 2.0
+# Seconds after which lists and searches see what another process has written.
+_SEEN = 0.5
 _DESCENDING = ("added", "volume")
 _THUMBNAILS = 4096
 _PAGES = 32
@@ -56,6 +62,7 @@ class Catalogue:
     def __init__(self, index: Index) -> None:
         self.index = index
         self._fresh = Remembered(64, FRESH)
+        self._snapshots = Remembered(8, _SEEN)
         self._orders = Remembered(_PAGES, FRESH)
         self._thumbnails = Remembered(_THUMBNAILS, 60.0)
         self._described: dict[str, tuple[str, int | None, int]] = {}
@@ -97,30 +104,35 @@ class Catalogue:
         return self._fresh.get(("labels", digest), lambda: self._labels(digest))
 
     def _labels(self, digest: str) -> list[dict[str, Any]]:
-        column = self.index.store.table(digest).search().select(["label"]).to_arrow()["label"]
+        """Count the labels."""
+        held = self.held(digest)
+        rows: Any = (
+            held.rows if held else self.index.store.table(digest).search().select(["label"]).to_arrow()
+        )
+        column = rows["label"]
         counts = {entry["values"]: entry["counts"] for entry in column.value_counts().to_pylist()}
         return [{"label": label, "n": counts[label]} for label in sorted(counts) if label]
+
+    def held(self, digest: str) -> Snapshot | None:
+        """Return all that lists and searches need, in memory; None where it is too much for that."""
+        snapshot = self._snapshots.get(digest, lambda: self.index.snapshots.of(self.index.store, digest))
+        fits = snapshot is not None and snapshot.rows is not None and len(snapshot.ids) <= EXACT_ROWS
+        return snapshot if fits else None
 
     def page(
         self, digest: str, filters: Filters, sort: Sort, offset: int, limit: int
     ) -> tuple[int, list[Row]]:
         """Return how many shapes pass the filters, and a page of them."""
-        where = filters.where()
-        order = self._orders.get((digest, where, sort), lambda: self._order(digest, where, sort))
-        wanted = order[offset : offset + limit]
-        if not wanted:
-            return len(order), []
-        listed = ", ".join(map(quoted, wanted))
-        rows = {row.id: row for row in self.index.store.rows(digest, f"id IN ({listed})")}
-        return len(order), [rows[key] for key in wanted if key in rows]
-
-    def _order(self, digest: str, where: str | None, sort: Sort) -> list[str]:
-        """Return the ids that pass a filter, in order; equal ones by id."""
-        query = self.index.store.table(digest).search().select(["id", sort])
-        table = (query.where(where) if where else query).to_arrow()
-        direction = "descending" if sort in _DESCENDING else "ascending"
-        ids: list[str] = table.sort_by([(sort, direction), ("id", "ascending")])["id"].to_pylist()
-        return ids
+        where, held = filters.where(), self.held(digest)
+        if held is None:
+            store, descending = self.index.store, sort in _DESCENDING
+            total = store.count(digest, where)
+            return total, store.rows(
+                digest, where, limit=limit, offset=offset, sort=sort, descending=descending
+            )
+        key = (digest, held.version, where, sort)
+        order = self._orders.get(key, lambda: _order(held, where, sort))
+        return len(order), [to_row(record) for record in held.records(order[offset : offset + limit])]
 
     def row(self, digest: str, key: str, columns: tuple[str, ...] = ()) -> Row:
         """Return one row, of the heavy columns those that are named.
@@ -130,11 +142,20 @@ class Catalogue:
         Refusal
             When there is none.
         """
-        if is_id(key):
+        found: list[Row] = []
+        held = self.held(digest) if set(columns) <= {"vector"} else None
+        if held is not None:
+            places = held.positions([key]) if is_id(key) else np.empty(0, np.intp)
+            vectors = held.vectors[places]
+            records = held.records(places)
+            found = [
+                replace(to_row(record), code=code) for record, code in zip(records, vectors, strict=True)
+            ]
+        elif is_id(key):
             found = self.index.store.rows(digest, f"id = {quoted(key)}", columns=[*LIGHT, *columns], limit=1)
-            if found:
-                return found[0]
-        raise Refusal(404, "no such shape; it may have been removed")
+        if not found:
+            raise Refusal(404, "no such shape; it may have been removed")
+        return found[0]
 
     def thumbnail(self, digest: str, key: str) -> bytes:
         """Return the picture of a row; empty where its dimension has none."""
@@ -145,50 +166,29 @@ class Catalogue:
     ) -> dict[str, Any]:
         """Return the shapes nearest to a row, of the index or of an upload."""
         begin = time.perf_counter()
-        options = {"rerank": True} if rerank else {}
-        answers = self.index.search(query.code, k, where=where, model=digest, **options)
+        held = None if rerank else self.held(digest)
+        if held is None:
+            answers = self.index.search(query.code, k, where=where, model=digest, rerank=rerank)
+        else:
+            near = in_memory(held, standardised_codes(query.code[None])[0], k, where)
+            rows = map(to_row, near.records(np.arange(len(near.distances))))
+            ranked = enumerate(zip(near.distances.tolist(), rows, strict=True), 1)
+            answers = Answers(
+                tuple(Found(rank, distance, row) for rank, (distance, row) in ranked), "exact", digest
+            )
         return ranking(card(query), answers, time.perf_counter() - begin)
 
     def changed(self) -> None:
         """Forget what a write has made old."""
-        for kept in (self._fresh, self._orders, self._thumbnails):
+        for kept in (self._fresh, self._snapshots, self._orders, self._thumbnails):
             kept.clear()
 
 
-class Remembered:
-    """Values that hold for some seconds, the latest used ones.
-
-    Parameters
-    ----------
-    size
-        Number of values kept.
-    seconds
-        How long a value holds.
-    """
-
-    def __init__(self, size: int, seconds: float) -> None:
-        self._size, self._seconds = size, seconds
-        self._lock = threading.Lock()
-        self._values: OrderedDict[Hashable, tuple[float, Any]] = OrderedDict()
-
-    def get(self, key: Hashable, make: Callable[[], Value]) -> Value:
-        """Return a value, made where there is none or an old one."""
-        now = time.monotonic()
-        with self._lock:
-            made, value = self._values.get(key, (-self._seconds, None))
-            if now - made < self._seconds:
-                self._values.move_to_end(key)
-                known: Value = value
-                return known
-        fresh = make()
-        with self._lock:
-            self._values[key] = (now, fresh)
-            self._values.move_to_end(key)
-            while len(self._values) > self._size:
-                self._values.popitem(last=False)
-        return fresh
-
-    def clear(self) -> None:
-        """Forget all values."""
-        with self._lock:
-            self._values.clear()
+def _order(held: Snapshot, where: str | None, sort: Sort) -> NDArray[np.intp]:
+    """Return the places of the rows that pass a filter, in order; equal ones by id."""
+    places = np.arange(len(held.ids)) if where is None else held.matching(where)
+    rows: Any = held.rows
+    keys = rows.select([sort, "id"]).take(places)
+    direction = "descending" if sort in _DESCENDING else "ascending"
+    found = require("pyarrow.compute").sort_indices(keys, [(sort, direction), ("id", "ascending")])
+    return np.asarray(places[found.to_numpy()])

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 from spem.errors import ReadError
 from spem.index.row import Row
 from spem.server.cards import card, full_card, ranking
-from spem.server.catalogue import Catalogue, Remembered
+from spem.server.catalogue import Catalogue
 from spem.server.refusals import Refusal
+from spem.server.remembered import Remembered
 
 if TYPE_CHECKING:
     from spem.server.jobs import Jobs, Step

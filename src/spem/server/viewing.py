@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from spem.errors import SandboxError
+from spem.errors import SandboxError, SpemError
 from spem.index.row import Row
 from spem.server.arrays import pack_arrays
 from spem.server.cache import Cache
@@ -72,6 +72,8 @@ class Viewing:
             if error.reason == "closed":
                 raise Busy(str(error), 5.0) from error
             raise Refusal(422, f"{header.get('name', 'shape')}: {error}") from error
+        except SpemError as error:
+            raise Refusal(422, str(error)) from error
 
 
 def packed_shape(row: Row) -> bytes:
