@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from spem.codes.codes import Failure
+from spem.codes.collection import TRAINING_SHAPES
 from spem.codes.listing import Listing
 from spem.codes.model import Model
 from spem.codes.settings import Settings
@@ -115,7 +116,9 @@ def add_sources(
     if model is None:
         make = Make(settings, manner.keep_shapes, manner.threads)
         try:
-            model = learn(listing, settings, make, drafts, manner.executor, manner.progress)
+            model = learn(
+                listing, settings, make, drafts, manner.executor, manner.progress, limit=TRAINING_SHAPES
+            )
         except ReadError as error:
             if error.failures:
                 clear_work(root)

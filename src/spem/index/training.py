@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from spem.codes.bands import Bands
-from spem.codes.collection import TRAINING_SHAPES
 from spem.codes.container import read_container, write_container
 from spem.codes.listing import Listing
 from spem.codes.model import Model
@@ -176,7 +175,7 @@ def learn(
     executor: Executor,
     progress: Progress,
     *,
-    limit: int = TRAINING_SHAPES,
+    limit: int,
 ) -> Model:
     """Learn the model of a new index, the same that codes of the same sources would get.
 
