@@ -64,7 +64,16 @@ def test_collections_are_skipped_without_data(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["codes_study", "pose_consistency", "retrieval", "rivals", "silhouettes", "sparse_coding"]
+    "name",
+    [
+        "codes_study",
+        "index_search",
+        "pose_consistency",
+        "retrieval",
+        "rivals",
+        "silhouettes",
+        "sparse_coding",
+    ],
 )
 def test_real_shapes_are_skipped_without_data(name, tmp_path):
     """Without the shapes that a benchmark is of there is no figure, only the reasons."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,4 +54,24 @@ def filled(tmp_path: Path, tiny_model: Model, ready_row: Callable[..., Row]) -> 
         ready_row("d'oh", label="it's", volume=4.0),
     ]
     write(index.store, tiny_model.digest, rows)
+    return index
+
+
+@pytest.fixture
+def crowd(tmp_path: Path, tiny_model: Model, ready_row: Callable[..., Row]) -> Index:
+    """Return an index of 300 rows in 30 classes of ten, wide apart and narrow within."""
+    rng = np.random.default_rng(5)
+    index = Index.open(tmp_path / "crowd.db")
+    index.store.save_model(tiny_model)
+    means = rng.standard_normal((30, tiny_model.n_code))
+    codes = means.repeat(10, axis=0) + 0.3 * rng.standard_normal((300, tiny_model.n_code))
+    rows = (
+        ready_row(f"shape {i}", label=str(i // 10), volume=1.0 + i, metadata={"half": str(i % 2)})
+        for i in range(300)
+    )
+    write(
+        index.store,
+        tiny_model.digest,
+        [replace(row, code=code.astype(np.float32)) for row, code in zip(rows, codes, strict=True)],
+    )
     return index

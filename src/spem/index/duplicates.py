@@ -112,10 +112,8 @@ class Duplicates(Sequence[Group]):
 
     def __repr__(self) -> str:
         shapes = sum(len(group.rows) for group in self.groups)
-        return (
-            f"Duplicates({len(self.groups)} groups of {shapes} shapes within {self.distance:g}, "
-            f"{len(self.copies)} files with copies, {self.method})"
-        )
+        within = f"within {self.distance:g}, {self.method}"
+        return f"Duplicates({len(self.groups)} groups of {shapes} shapes {within})"
 
 
 def find_duplicates(

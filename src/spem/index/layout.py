@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 
 from spem.errors import ParameterError
 from spem.index.schema import standardised_codes
@@ -89,7 +90,9 @@ def _embedded(vectors: NDArray[np.float32], rng: np.random.Generator) -> NDArray
         random_state=int(rng.integers(2**32)),
         method="barnes_hut" if len(vectors) > _LEAST * 10 else "exact",
     )
-    return np.asarray(model.fit_transform(axes), np.float64)
+    # waiting threads cost more than a second one gains, many times more on a busy machine
+    with threadpool_limits(1):
+        return np.asarray(model.fit_transform(axes), np.float64)
 
 
 def _principal_axes(vectors: NDArray[np.float32]) -> NDArray[np.float64]:
