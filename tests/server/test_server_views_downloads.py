@@ -14,6 +14,7 @@ from spem.errors import ParameterError, ShapeError
 from spem.server.views import VIEWS
 from spem.server.views.downloads import DOWNLOADS
 from spem.server.views.outline import mesh_of
+from spem.server.views.surface_file import vertex_values
 
 HAND = spem.Shape.from_mask(np.ones((9, 14)), 0.5, origin=(3.0, 4.0), name="left/hand: α?")
 
@@ -91,7 +92,8 @@ def test_surface_has_all_maps_and_colours_of_one(dumbbell):
     np.testing.assert_allclose(mesh.vertices, np.array(dumbbell.origin) + found.position * dumbbell.spacing)
     np.testing.assert_array_equal(mesh.faces, found.faces)
     values = mesh.metadata["_ply_raw"]["vertex"]["data"]["map_2"].ravel()
-    np.testing.assert_allclose(values, spem.maps(dumbbell, 8).values[found.node, 1], rtol=1e-5)
+    expected = vertex_values(dumbbell, found, spem.maps(dumbbell, 8).values)[:, 1]
+    np.testing.assert_allclose(values, expected, rtol=1e-5)
     red, blue = mesh.visual.vertex_colors[:, 0].astype(int), mesh.visual.vertex_colors[:, 2].astype(int)
     bright = np.abs(values) > 0.5 * np.abs(values).max()
     assert ((red > blue) == (values > 0))[bright].all()
@@ -101,11 +103,22 @@ def test_surface_shows_field_or_parts(dumbbell):
     """Its values are v at a rho, or numbers of parts."""
     mesh = read_ply(DOWNLOADS["surface.ply"](dumbbell, {"show": "field", "rho": 2.5})[0])
     v = mesh.metadata["_ply_raw"]["vertex"]["data"]["v"].ravel()
-    node = mesh_of(dumbbell).node
-    np.testing.assert_allclose(v, spem.field(dumbbell, 2.5)[node], atol=1e-5)
+    expected = vertex_values(dumbbell, mesh_of(dumbbell), spem.field(dumbbell, [2.5]))[:, 0]
+    np.testing.assert_allclose(v, expected, atol=1e-5)
     mesh = read_ply(DOWNLOADS["surface.ply"](dumbbell, {"show": "part", "k": 2})[0])
     part = mesh.metadata["_ply_raw"]["vertex"]["data"]["part"].ravel()
     np.testing.assert_array_equal(part, VIEWS["parts"](dumbbell, {"k": 2})[1]["vertex_part"])
+
+
+def test_colours_of_a_ball_are_nearly_one():
+    """A field of a ball depends on the depth alone, which all vertices share, wherever nodes lie."""
+    ball = spem.synthetic.ball(12.0, 1.0)
+    mesh = mesh_of(ball)
+    v = spem.field(ball, [4.0])
+    interpolated, nearest = vertex_values(ball, mesh, v)[:, 0], v[mesh.node, 0]
+    assert np.std(interpolated) < 0.35 * np.std(nearest)
+    exact = 12 / 11 * np.sinh(11 / 4) / np.sinh(12 / 4)
+    assert np.mean(interpolated) == pytest.approx(exact, abs=0.02)
 
 
 @pytest.mark.parametrize(

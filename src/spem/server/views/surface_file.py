@@ -6,11 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib import colormaps
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import map_coordinates
 
 from spem.errors import ParameterError, ShapeError
 from spem.fields.rho import single_rho
+from spem.plots.extension import extend_values
+from spem.plots.level import surface_level
+from spem.plots.raster import vertex_normals
 from spem.plots.style import FIELD_CMAP, MAP_CMAP, part_colours
+from spem.plots.surfaces import SAMPLE_DEPTH
 from spem.server.views.division import divide
 from spem.server.views.field import N_MAPS, shown_maps
 from spem.server.views.options import Options, shown_shape, whole_option
@@ -30,8 +35,9 @@ class _Values:
 def surface_file(shape: Shape, options: Options) -> bytes:
     r"""Return the surface of a solid as a binary PLY file.
 
-    Vertices are those of the view of the geometry, in the shape's own coordinates. Their values are those of
-    the nodes below them, as properties of floats that viewers of meshes can colour by.
+    Vertices are those of the view of the geometry, in the shape's own coordinates. Their values are those one
+    voxel below them, as properties of floats that viewers of meshes can colour by; their part is that of the
+    nearest node.
 
     Parameters
     ----------
@@ -65,32 +71,68 @@ def surface_file(shape: Shape, options: Options) -> bytes:
         raise ParameterError(msg)
     shown = shown_shape(shape, options)
     mesh = mesh_of(shown)
-    return _ply(shown, mesh, kinds[show](shape, options, mesh.node))
+    return _ply(shown, mesh, kinds[show](shape, options, mesh))
 
 
-def _maps(shape: Shape, options: Options, node: NDArray[np.int32]) -> _Values:
+def vertex_values(shape: Shape, mesh: Mesh, values: ArrayLike) -> NDArray[np.float64]:
+    """Interpolate values of nodes one voxel below the vertices of a mesh.
+
+    The node nearest to a vertex may be anywhere in the first voxel, and fields fall fast there.
+
+    Parameters
+    ----------
+    shape
+        The shape.
+    mesh
+        Its mesh, as `mesh_of` makes it.
+    values
+        ``(n_nodes, k)`` values.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(v, k)``.
+
+    Examples
+    --------
+    >>> cube = Shape.from_mask(np.ones((5, 5, 5)))
+    >>> mesh = mesh_of(cube)
+    >>> below = vertex_values(cube, mesh, cube.points)
+    >>> bool(np.ptp(below) < np.ptp(mesh.position))
+    True
+    """
+    step = min(shape.spacing) / np.asarray(shape.spacing)
+    normals = vertex_normals(mesh.position * np.asarray(shape.spacing), mesh.faces)
+    places = (mesh.position - SAMPLE_DEPTH * step * normals).T
+    level = surface_level(shape)
+    columns = np.asarray(values, np.float64).T
+    grids = (extend_values(shape, column, level) for column in columns)
+    return np.stack([map_coordinates(grid, places, order=1, mode="nearest") for grid in grids], axis=1)
+
+
+def _maps(shape: Shape, options: Options, mesh: Mesh) -> _Values:
     """Return all maps, coloured by one of them."""
     number = whole_option(options, "map", 1, 1, N_MAPS)
     _, maps = shown_maps(shape, options)
-    values = np.asarray(maps.values, np.float64)[node]
+    values = vertex_values(maps.shape, mesh, maps.values)
     limit = float(np.abs(values[:, number - 1]).max()) or 1.0
     colours = colormaps[MAP_CMAP](0.5 + values[:, number - 1] / (2 * limit))[:, :3]
     columns = {f"map_{j + 1}": column for j, column in enumerate(values.T)}
     return _Values(columns, colours, f"map {number}, red to blue from {limit:.4g} to {-limit:.4g}")
 
 
-def _field(shape: Shape, options: Options, node: NDArray[np.int32]) -> _Values:
+def _field(shape: Shape, options: Options, mesh: Mesh) -> _Values:
     """Return the field at one ρ."""
     field, _ = shown_maps(shape, options, 1)
     length = options.get("rho")
     rho = float(np.median(field.rho)) if length is None else single_rho(length)
-    values = np.asarray(field.at(rho), np.float64)[node]
+    values = vertex_values(field.shape, mesh, field.at([rho]))[:, 0]
     return _Values({"v": values}, colormaps[FIELD_CMAP](values)[:, :3], f"field at rho {rho:.4g}")
 
 
-def _parts(shape: Shape, options: Options, node: NDArray[np.int32]) -> _Values:
+def _parts(shape: Shape, options: Options, mesh: Mesh) -> _Values:
     """Return the part of each vertex."""
-    labels = divide(shape, options).labels[node]
+    labels = divide(shape, options).labels[mesh.node]
     return _Values({"part": labels.astype(np.float64)}, part_colours(labels), "parts, -1 for none")
 
 
