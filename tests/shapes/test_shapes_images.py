@@ -324,3 +324,10 @@ def test_polarity_is_right_on_all_real_silhouettes(data_dir, folder, count, dark
     assert len(files) == count
     polarity = "dark shape on bright" if dark else "bright shape on dark"
     assert all(polarity in read_image(path).report.method for path in files)
+
+
+def test_formats_that_start_programs_are_not_decoded(tmp_path):
+    """PostScript, which Pillow hands to an interpreter, is no image whatever its suffix."""
+    (tmp_path / "page.png").write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\nquit\n")
+    with pytest.raises(ReadError, match="not an image that can be decoded"):
+        read_image(tmp_path / "page.png")

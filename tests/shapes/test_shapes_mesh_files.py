@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -88,3 +90,36 @@ def test_missing_file_is_refused(tmp_path: Path) -> None:
     """A path without a file is a ReadError."""
     with pytest.raises(ReadError, match=r"absent\.obj: no such file; check the path"):
         load_mesh(tmp_path / "absent.obj")
+
+
+@pytest.mark.parametrize("where", ["beside.bin", "../beside.bin", "file:///beside.bin"])
+def test_a_scene_that_names_another_file_is_refused(tmp_path: Path, where: str) -> None:
+    """A buffer outside the file is not opened, whether it is there or not."""
+    folder = tmp_path / "inner"
+    folder.mkdir()
+    for place in (tmp_path, folder):
+        (place / "beside.bin").write_bytes(bytes(36))
+    view = {"buffer": 0, "byteLength": 36}
+    tree = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [view],
+        "buffers": [{"byteLength": 36, "uri": where}],
+    }
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text), len(text), b"JSON")
+    (folder / "scene.glb").write_bytes(head + text)
+    with pytest.raises(ReadError, match="names another file"):
+        load_mesh(folder / "scene.glb")
+
+
+def test_coordinates_without_a_volume_are_refused(tmp_path: Path) -> None:
+    """Coordinates whose extent overflows are a ReadError, not a grid of NaN."""
+    path = tmp_path / "far.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv -1e308 1e308 0\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n")
+    with pytest.raises(ReadError, match=r"coordinates beyond 1e\+100"):
+        load_mesh(path)

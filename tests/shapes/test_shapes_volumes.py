@@ -268,3 +268,33 @@ def test_values_that_are_no_labels_are_refused(tmp_path, values):
     np.save(tmp_path / "seg.npy", np.asarray(values))
     with pytest.raises(ShapeError, match="seg: its values are no labels"):
         read_labels(tmp_path / "seg.npy", per_label=True)
+
+
+@pytest.mark.parametrize("spacing", [1e300, 1e-300])
+def test_a_spacing_out_of_any_unit_is_refused(tmp_path, spacing):
+    """A file whose voxels have a volume that is no number is refused, not filled with infinities."""
+    np.savez(tmp_path / "far.npz", mask=np.pad(np.ones((4, 4, 4)), 2), spacing=[spacing] * 3)
+    with pytest.raises(ParameterError, match="take another unit"):
+        read_volume(tmp_path / "far.npz")
+
+
+def test_a_header_of_gigabytes_is_refused_before_it_is_read(tmp_path):
+    """No room is made for a header that only says it is long."""
+    (tmp_path / "long.npy").write_bytes(b"\x93NUMPY\x02\x00\xff\xff\xff\xff{")
+    with pytest.raises(ReadError, match="its header says it has 4294967295 bytes"):
+        read_volume(tmp_path / "long.npy")
+
+
+def test_a_giant_spacing_of_an_archive_is_refused_by_its_header(tmp_path):
+    """What lies beside the volume is held to the memory limit too."""
+    np.savez_compressed(tmp_path / "bomb.npz", mask=np.ones((2, 2)), spacing=np.zeros(100_000))
+    with pytest.raises(SizeError, match="100000 cells"):
+        read_volume(tmp_path / "bomb.npz", memory_limit=1 << 20)
+
+
+def test_an_archive_of_many_arrays_is_told_in_short(tmp_path):
+    """Names of arrays are listed up to a few, without what a terminal would obey."""
+    np.savez(tmp_path / "many.npz", **{f"a\x1b{i}": np.ones(1) for i in range(50)})
+    with pytest.raises(ReadError, match=r"a\?0, .* and 42 more") as caught:
+        read_volume(tmp_path / "many.npz")
+    assert str(caught.value).isprintable()

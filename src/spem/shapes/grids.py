@@ -10,6 +10,9 @@ import numpy as np
 
 from spem.errors import ParameterError
 
+# So that the volume of a voxel and the inverse of its square are numbers, in up to six dimensions.
+_LEAST, _LARGEST = 1e-50, 1e50
+
 
 def spacing_per_axis(spacing: Any, ndim: int, name: str) -> tuple[float, ...]:
     """Return one checked spacing per axis.
@@ -41,6 +44,31 @@ def spacing_per_axis(spacing: Any, ndim: int, name: str) -> tuple[float, ...]:
         msg = f"{name}: spacing={spacing}: expected one positive number, or {ndim} of them, one per axis"
         raise ParameterError(msg)
     return tuple(np.broadcast_to(steps, (ndim,)).tolist())
+
+
+def declared_spacing(spacing: Any, ndim: int, name: str) -> tuple[float, ...]:
+    """Return one checked spacing per axis, of a grid that is there already.
+
+    Parameters
+    ----------
+    spacing, ndim, name
+        As `spacing_per_axis`.
+
+    Raises
+    ------
+    ParameterError
+        As `spacing_per_axis`, and when a volume or a field on such a grid is no number.
+
+    Examples
+    --------
+    >>> declared_spacing(0.5, 2, "hand")
+    (0.5, 0.5)
+    """
+    steps = spacing_per_axis(spacing, ndim, name)
+    if min(steps) < _LEAST or max(steps) > _LARGEST:
+        msg = f"{name}: spacing={spacing}: expected numbers of {_LEAST:g} to {_LARGEST:g}; take another unit"
+        raise ParameterError(msg)
+    return steps
 
 
 def voxel_count(voxels: Any, name: str) -> int:

@@ -18,11 +18,13 @@ from spem.errors import ReadError, ShapeError, SpemError
 from spem.shapes.coverage import coverage_cuts, is_coverage
 from spem.shapes.grey import Grey, grey_levels
 from spem.shapes.levels import border_repairs, level_shape, otsu_level, refuse_masked
-from spem.shapes.limits import check_file, check_size
+from spem.shapes.limits import check_file, check_size, printable
 from spem.shapes.shape import Cuts, Report, Shape
 
 # Decoded colour, grey level as float32 and as level function, masks: the most held for one pixel.
 _BYTES_PER_PIXEL = 24
+# What is decoded, whatever the suffix; of the others that Pillow knows some start programs.
+_FORMATS = ("PNG", "GIF", "JPEG", "BMP", "DIB", "TIFF", "WEBP", "PPM")
 # What decoders raise on damaged files.
 _DAMAGED = (
     OSError,
@@ -151,7 +153,7 @@ def _decode(path: Path, memory_limit: int | None) -> tuple[NDArray[Any], tuple[s
     with _DECODER:
         before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
         try:
-            with Image.open(path) as image:
+            with Image.open(path, formats=_FORMATS) as image:
                 check_size((image.height, image.width), _BYTES_PER_PIXEL, memory_limit, str(path))
                 frames = getattr(image, "n_frames", 1)
                 if frames > 1 and image.format == "TIFF":
@@ -165,8 +167,7 @@ def _decode(path: Path, memory_limit: int | None) -> tuple[NDArray[Any], tuple[s
             msg = f"{path}: not an image that can be decoded; the content does not fit any known format"
             raise ReadError(msg) from error
         except _DAMAGED as error:
-            reason = " ".join(str(error).split()) or type(error).__name__
-            msg = f"{path}: the image is damaged or truncated ({reason}); export it again"
+            msg = f"{path}: the image is damaged or truncated ({printable(error)}); export it again"
             raise ReadError(msg) from error
         finally:
             Image.MAX_IMAGE_PIXELS = before

@@ -115,6 +115,27 @@ def format_size(size: float) -> str:
     return f"{size:.4g} TiB"
 
 
+def printable(error: object, most: int = 120) -> str:
+    r"""Return what a library says of a damaged file as the words of one line, without its control characters.
+
+    Parameters
+    ----------
+    error
+        The error, or any text.
+    most
+        Most characters that are told.
+
+    Examples
+    --------
+    >>> printable(ValueError("no magic:\n\x1b[31m"))
+    'no magic: ?[31m'
+    """
+    text = "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in str(error))
+    short = " ".join(text.split())
+    name = "" if isinstance(error, str) else type(error).__name__
+    return (short if len(short) <= most else f"{short[: most - 3]}...") or name
+
+
 def check_file(path: Path) -> None:
     """Refuse a path that is no file, or an empty one.
 

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from spem.errors import ReadError
 from spem.shapes.kinds import MESH_SUFFIXES
-from spem.shapes.limits import check_file
+from spem.shapes.limits import check_file, printable
 
+# Largest coordinate whose cube, a volume, is a number.
+_FARTHEST = 1e100
 # The counts of an OFF file stand among its first words, behind comments at most.
 _HEADER_LINES = 100
 # Bytes of a binary STL file before its faces: a title and their number.
@@ -50,18 +52,23 @@ def load_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         raise ReadError(msg)
     check_file(path)
     try:
-        mesh = trimesh.load_scene(path, process=False, skip_materials=True).to_mesh()
+        with path.open("rb") as file:
+            kind = path.suffix[1:].lower()
+            scene = trimesh.load_scene(file, kind, resolver=_Alone(), process=False, skip_materials=True)
+        mesh = scene.to_mesh()
         vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
     except Exception as error:
         # Readers of broken files fail in many ways: with ValueError, IndexError, struct.error, ...;
         # an ImportError comes from one that looks for the character set of what is no text.
-        reason = "neither text nor whole" if isinstance(error, ImportError) else str(error)
-        reason = " ".join(reason.split())[:120] or type(error).__name__
+        reason = "neither text nor whole" if isinstance(error, ImportError) else printable(error)
         msg = f"{path}: cannot be read as {path.suffix[1:].upper()} ({reason}); the file may be truncated"
         raise ReadError(msg) from error
     if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
         stray = faces.max() if faces.min() >= 0 else faces.min()
         msg = f"{path}: a face names vertex {stray}, counted from 0, of {len(vertices)}; the file is damaged"
+        raise ReadError(msg)
+    if vertices.size and np.abs(vertices[np.isfinite(vertices)]).max(initial=0) > _FARTHEST:
+        msg = f"{path}: coordinates beyond {_FARTHEST:g}, whose volume is no number; the file is damaged"
         raise ReadError(msg)
     if path.suffix.lower() == ".stl":
         _check_stl_count(path, len(faces))
@@ -71,6 +78,30 @@ def load_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     if path.suffix.lower() == ".off":
         _check_off_count(path, len(faces))
     return vertices, faces
+
+
+class _Alone(trimesh.resolvers.Resolver):  # type: ignore[misc]
+    """Refuses the other files that a mesh names: pictures, materials, buffers."""
+
+    def __init__(self) -> None:
+        """Hold nothing."""
+
+    def get(self, key: str) -> bytes:
+        """Refuse a file."""
+        msg = "it names another file, and spem opens none but the one that it is given"
+        raise ValueError(msg)
+
+    def write(self, name: str, data: object) -> None:
+        """Refuse to write."""
+        raise ValueError(name)
+
+    def namespaced(self, namespace: str) -> _Alone:
+        """Return itself, since there are no folders."""
+        return self
+
+    def keys(self) -> tuple[str, ...]:
+        """Name no file."""
+        return ()
 
 
 def _check_stl_count(path: Path, n_faces: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,12 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ReadError, SpemError
-from spem.shapes.grids import spacing_per_axis
+from spem.shapes.grids import declared_spacing
 from spem.shapes.kinds import TIFF_SUFFIXES
-from spem.shapes.limits import check_file, check_size
+from spem.shapes.limits import check_file, check_size, printable
 
 # Arrays of an .npz in the order in which they are looked for.
 _ARRAYS = ("mask", "volume", "labels")
+# How many names of arrays a message lists.
+_LISTED = 8
+# NumPy refuses longer ones too, but only after it made room for them.
+_LONGEST_HEADER = 10_000
 _UNIT_AXES = "CTS"
 
 
@@ -61,7 +66,7 @@ class Stack:
         """
         if spacing is None:
             return self
-        return replace(self, spacing=spacing_per_axis(spacing, self.array.ndim, name))
+        return replace(self, spacing=declared_spacing(spacing, self.array.ndim, name))
 
 
 def read_stack(path: Path, bytes_per_voxel: float, memory_limit: int | None) -> Stack:
@@ -107,8 +112,7 @@ def read_stack(path: Path, bytes_per_voxel: float, memory_limit: int | None) -> 
     except MemoryError:
         raise
     except Exception as error:
-        reason = " ".join(str(error).split())[:120] or type(error).__name__
-        msg = f"{path}: damaged, truncated or not a {path.suffix} file ({reason}); write it again"
+        msg = f"{path}: damaged, truncated or not a {path.suffix} file ({printable(error)}); write it again"
         raise ReadError(msg) from error
     if stack.array.ndim == 0 or stack.array.size == 0 or stack.array.dtype.kind not in "biuf":
         msg = f"{path}: expected an array of numbers, got {stack.array.dtype} of shape {stack.array.shape}"
@@ -165,14 +169,18 @@ def _npz(path: Path, check: _Check) -> Stack:
         names = [n for n in archive.files if n not in ("spacing", "origin")]
         known = [n for n in _ARRAYS if n in names]
         if not known and len(names) != 1:
+            listed = printable(", ".join(archive.files[:_LISTED])) or "(none)"
+            more = f" and {len(archive.files) - _LISTED} more" if len(archive.files) > _LISTED else ""
             msg = (
-                f"{path}: no volume among its arrays {', '.join(archive.files) or '(none)'}; "
+                f"{path}: no volume among its arrays {listed}{more}; "
                 f"expected one named {', '.join(_ARRAYS[:-1])} or {_ARRAYS[-1]}, or one array alone"
             )
             raise ReadError(msg)
         chosen = (known or names)[0]
-        with zipfile.ZipFile(path) as members, members.open(f"{chosen}.npy") as member:
-            check(_array_shape(member, f"{path}, array {chosen!r}"))
+        with zipfile.ZipFile(path) as members:
+            for name in (chosen, *({"spacing", "origin"} & set(archive.files))):
+                with members.open(f"{name}.npy") as member:
+                    check(_array_shape(member, f"{path}, array {name!r}"))
         array = archive[chosen]
         d = array.ndim
         spacing = archive["spacing"] if "spacing" in archive.files else np.ones(d)
@@ -190,6 +198,12 @@ def _array_shape(file: IO[bytes], what: str) -> tuple[int, ...]:
     if not start.startswith(magic):
         msg = f"{what}: damaged, truncated or not a .npy file (it does not begin as one); write it again"
         raise ReadError(msg)
+    length_bytes = 2 if start[-2] == 1 else 4
+    length = file.read(length_bytes)
+    if int.from_bytes(length, "little") > _LONGEST_HEADER:
+        msg = f"{what}: its header says it has {int.from_bytes(length, 'little')} bytes; the file is damaged"
+        raise ReadError(msg)
+    file.seek(-length_bytes, os.SEEK_CUR)
     read = np.lib.format.read_array_header_1_0 if start[-2] == 1 else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(file)
     if dtype.hasobject:
