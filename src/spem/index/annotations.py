@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from spem.errors import LabelError, ParameterError
 from spem.index.row import Row
 from spem.retrieval.labels import labelled, match_labels, unused_labels
 
 
-def annotated(row: Row, label: str | None, metadata: Mapping[str, str | None]) -> Row:
+def annotated(row: Row, label: str | None, metadata: Mapping[Any, Any]) -> Row:
     """Return a row with another label and further metadata; a value None takes a key away.
 
     Raises

@@ -7,10 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import TypeVar
 
 from spem.codes.sources import Source, source_path
 from spem.shapes.kinds import SUFFIXES, has_suffix
 from spem.shapes.shape import Shape
+
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -145,6 +148,6 @@ def _gone(
                 yield content, path
 
 
-def _frozen(table: Mapping[str, Iterable[Source] | Iterable[str]]) -> dict[str, tuple[object, ...]]:
+def _frozen(table: Mapping[str, Iterable[_T]]) -> dict[str, tuple[_T, ...]]:
     """Return a table of tuples."""
     return {key: tuple(values) for key, values in table.items()}
