@@ -177,6 +177,10 @@ def test_labels_and_metadata(shapes, tmp_path):
     assert {row.name: row.label for row in index.rows()} == {"7": "", "8": "wide", "9": "", "10": ""}
     assert all(row.metadata == {"site": "Oslo"} for row in index.rows())
     assert index.get(index.rows()[0].id).shape == b""
+    index.add(shapes, labels={"9.npy": "wider"}, metadata={"by": "Kari"})
+    labels = {row.name: row.label for row in index.rows()}
+    assert labels == {"7": "", "8": "wide", "9": "wider", "10": ""}
+    assert all(row.metadata == {"site": "Oslo", "by": "Kari"} for row in index.rows())
     with pytest.raises(LabelError, match="several labels fit"):
         index.add(shapes, labels={"a/8.npy": "x", "b/8.npy": "y"})
     with pytest.raises(ParameterError, match="expected str, got int; write metadata n as text"):

@@ -23,9 +23,10 @@ from spem.index.changes import Known, Plan, place, plan
 from spem.index.encoding import Describe, Described
 from spem.index.executors import Executor, Item, LocalExecutor
 from spem.index.naming import Labelling
+from spem.index.row import Row
 from spem.index.store import Store
 from spem.index.training import Drafts, Finish, Make, learn
-from spem.index.updates import known, relocate, write
+from spem.index.updates import annotate, known, relocate, write
 from spem.shapes.shape import Shape
 
 Progress = Callable[[str, int, int], None]
@@ -129,6 +130,8 @@ def add_sources(
     todo, n_gone = _plan(known(store, model.digest), sources, folders, prune=manner.prune)
     _encode(store, listing, todo, model, drafts, manner)
     relocate(store, model.digest, todo)
+    if manner.labels or manner.metadata:
+        _annotate(store, listing, todo, model, manner)
     clear_work(root)
     return replace(_summary(listing, todo, model), gone=n_gone)
 
@@ -200,6 +203,18 @@ def _encode(store: Store, listing: Listing, todo: Plan, model: Model, drafts: Dr
     for key, found in todo.encode.items():
         for source in found:
             listing.fails_again(key, source)
+
+
+def _annotate(store: Store, listing: Listing, todo: Plan, model: Model, manner: Manner) -> None:
+    """Give labels and metadata to rows that were there already."""
+    contents = {key for _, key in listing if key is not None and key not in todo.encode}
+    sources: dict[str, list[Row]] = {}
+    for row in store.rows(model.digest):
+        if row.hash in contents:
+            sources.setdefault(row.hash, []).append(row)
+    labelling = Labelling.of(listing.sources, manner.labels, manner.metadata)
+    given = {row.id: row for rows in sources.values() for row in labelling.apply(rows)}
+    annotate(store, model.digest, lambda row: given[row.id], list(given))
 
 
 def _described(
