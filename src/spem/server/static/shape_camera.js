@@ -101,3 +101,25 @@ export function faceUnder(turned, face, x, y) {
   }
   return best;
 }
+
+/** Middle of some points, the radius of the ball about it, and how far they reach right and up of it in a view. */
+export function extents(points, rotation) {
+  const low = [Infinity, Infinity, Infinity];
+  const high = [-Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < points.length; i += 1) {
+    low[i % 3] = Math.min(low[i % 3], points[i]);
+    high[i % 3] = Math.max(high[i % 3], points[i]);
+  }
+  const centre = low.map((value, axis) => (value + high[axis]) / 2);
+  const extent = [0, 0];
+  let radius = 0;
+  for (let i = 0; i < points.length; i += 3) {
+    const from = [0, 1, 2].map((axis) => points[i + axis] - centre[axis]);
+    radius = Math.max(radius, Math.hypot(...from));
+    for (const row of [0, 1]) {
+      const along = from.reduce((sum, value, axis) => sum + rotation[3 * row + axis] * value, 0);
+      extent[row] = Math.max(extent[row], Math.abs(along));
+    }
+  }
+  return { centre, radius, extent };
+}

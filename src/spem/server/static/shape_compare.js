@@ -12,6 +12,8 @@ import { facts } from "./shape_details.js";
 import { Stage } from "./shape_stage.js";
 
 const WORDS = 4;
+/** Points of a word that are marked, those that say most. */
+const POINTS = 40;
 const NONE = { header: { words: [] }, arrays: {} };
 
 /** Fill an element with the comparison of two shapes. */
@@ -94,20 +96,22 @@ class Comparison {
       this.why.replaceChildren(element("p", { class: "shape-note" }, failure || "No visual word makes them alike."));
       return;
     }
+    const { correlation, n_words: count } = words.header;
     const total = found.reduce((sum, { share }) => sum + share, 0);
-    const note = `Visual words are what codes count: typical neighbourhoods of a shape. These ${found.length} make up ${shown(total, 2)} of the correlation of the two codes; their points are marked on both.`;
+    const note = `Visual words are what codes are made of: typical surroundings of a point. Of ${count} words these ${found.length} bring most to the correlation of the two codes: ${shown(total, 2)} of ${shown(correlation, 2)}. The points that say so are marked on both.`;
     this.list = element("ol", { class: "shape-legend words" });
     this.why.replaceChildren(element("h3", {}, "Why they are alike"), element("p", { class: "shape-note" }, note), this.list);
     this.mark(null);
   }
 
-  entry({ kind, word, share }, i) {
+  entry({ kind, of, word, share }, i) {
     const swatch = element("span", { class: "swatch", "aria-hidden": "true" });
     swatch.style.background = partColour(i);
     const pick = () => this.mark(this.picked === i ? null : i);
     return element("li", {},
       element("button", { type: "button", "aria-pressed": String(this.picked === i), onclick: pick },
-        swatch, element("span", {}, `${kindName(kind)}, word ${word + 1}`), element("span", { class: "share" }, shown(share, 2))));
+        swatch, element("span", {}, `${kindName(kind, of)}, word ${word + 1}`),
+        element("span", { class: "share" }, shown(share, 2))));
   }
 
   /** Mark the points of one word, or of all. */
@@ -121,7 +125,10 @@ class Comparison {
       const marks = this.words.header.words
         .map((word, at) => ({ at, span: word[side], colour: partColour(at) }))
         .filter(({ at }) => picked === null || picked === at)
-        .map(({ span, colour }) => ({ colour, points: points.values.subarray(span[0] * points.shape[1], span[1] * points.shape[1]) }));
+        .map(({ span: [from, to], colour }) => ({
+          colour,
+          points: points.values.subarray(from * points.shape[1], Math.min(to, from + POINTS) * points.shape[1]),
+        }));
       this.sides[i].stage.show({ marks });
     });
     this.paint();
@@ -133,7 +140,8 @@ class Comparison {
   }
 }
 
-function kindName(kind) {
-  const words = String(kind).replaceAll("_", " ");
-  return words.charAt(0).toUpperCase() + words.slice(1);
+/** What features of a kind are of, as a name. */
+function kindName(kind, of) {
+  const name = of || kind;
+  return name.charAt(0).toUpperCase() + name.slice(1);
 }

@@ -39,8 +39,9 @@ export function report(card, geometry) {
   return element("dl", { class: "shape-report" }, entries.filter(Boolean).flat());
 }
 
-/** Links to everything the server writes of a shape; `onPicture` saves what is shown. */
-export function downloads(id, ndim, view, onPicture) {
+/** Links to everything the server writes of a shape; `onPicture` saves what is shown, `rho` is that of the field. */
+export function downloads(id, ndim, view, rho, onPicture) {
+  const colours = { field: { show: "field", rho }, part: { show: "part", k: view.k } }[view.show === "strength" ? "part" : view.show];
   const file = (what, words, parameters = {}) =>
     element("a", { class: "button small", href: address(path(id, what), parameters), download: "" }, words);
   return element(
@@ -50,7 +51,7 @@ export function downloads(id, ndim, view, onPicture) {
     file("field.npz", "Fields, NPZ"),
     file("maps.npz", "Maps, NPZ"),
     file("parts.npz", "Parts, NPZ", { k: view.k }),
-    ndim === 3 && file("surface.ply", "Surface, PLY"),
+    ndim === 3 && file("surface.ply", "Surface, PLY", colours ?? { show: "map", map: view.map + 1 }),
     view.node !== null && file("node.csv", "Profile, CSV", { node: view.node }),
   );
 }

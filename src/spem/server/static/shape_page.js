@@ -2,6 +2,7 @@
 
 import { debounced, download, element } from "./dom.js";
 import { Bar, withBar } from "./shape_bar.js";
+import { Beside } from "./shape_beside.js";
 import { colourField, colourMap, colourParts, colourSource, colourStrength, Colouring, shown } from "./shape_colouring.js";
 import { Controls } from "./shape_controls.js";
 import { onTheme } from "./colours.js";
@@ -54,14 +55,14 @@ class ShapePage {
     this.pointTitle = heading("Field against ρ");
     this.pointNote = element("p", { class: "shape-note" });
     const point = element("section", { class: "shape-card shape-point" }, this.pointTitle, this.pointNote, this.profile.root);
-    this.comparison = element("section", { class: "shape-card shape-compared", hidden: true });
+    this.beside = new Beside(this.id, () => this.change({ compare: null }));
     this.files = element("div");
     return element(
       "article",
       { class: "shape" },
       element("header", { class: "shape-head" }, element("h1", {}, this.card.name), element("p", {}, facts(this.card))),
       element("div", { class: "shape-main" }, this.controls.root, this.figure, point),
-      this.comparison,
+      this.beside.root,
       element("section", {}, heading("Similar shapes"), ...similar(this.id)),
       element("div", { class: "shape-more" },
         element("section", {}, heading("About this shape"), report(this.card, this.geometry)),
@@ -72,10 +73,9 @@ class ShapePage {
   /** Show what the address says. */
   update(state) {
     this.state = { ...state };
-    const before = this.view?.compare;
     this.view = readView(this.state, this);
     this.draw();
-    if ((this.view.compare ?? null) !== (before ?? null)) this.compare(this.view.compare);
+    this.beside.show(this.view.compare);
   }
 
   /** Look at something else, and let the address say so. */
@@ -87,7 +87,9 @@ class ShapePage {
 
   /** Let the address say the rho that the slider was left at. */
   keepRho() {
-    if (this.state.rho !== undefined && this.root.isConnected) this.setState({ rho: this.state.rho });
+    if (this.state.rho === undefined || !this.root.isConnected) return;
+    this.setState({ rho: this.state.rho });
+    this.offer();
   }
 
   /** Move to another rho: the next frame shows it. */
@@ -181,8 +183,8 @@ class ShapePage {
     this.pointNote.textContent = node === null
       ? "How far the boundary is felt, over the whole shape. Choose a point of the picture to see its own curve."
       : `Node ${node}, beside all ${this.geometry.n.toLocaleString("en")} nodes of the shape.`;
-    this.files.replaceChildren(downloads(this.id, this.geometry.ndim, this.view, () => this.savePicture()));
     this.paint();
+    this.offer();
   }
 
   /** Colour the pictures, and say what they show. */
@@ -204,6 +206,12 @@ class ShapePage {
     this.stage.describe(`${solid ? "Surface" : "Picture"} of ${this.card.name}. ${title}, ${range}. Arrow keys ${solid ? "turn it" : "choose a point"}.`);
   }
 
+  /** Offer files of what is shown. */
+  offer() {
+    const rho = writtenRho(this.fields, this.view.place);
+    this.files.replaceChildren(downloads(this.id, this.geometry.ndim, this.view, rho, () => this.savePicture()));
+  }
+
   /** Show the field until what was asked for is here. */
   paintMeanwhile() {
     colourField(this.colouring, this.fields, this.view.place, this.view.fit);
@@ -216,31 +224,9 @@ class ShapePage {
     withBar(this.stage.drawn(), this.colouring).toBlob((blob) => download(`${what}.png`, blob, "image/png"));
   }
 
-  /** Set another shape beside this one, or none. */
-  async compare(other) {
-    this.comparison.hidden = other === null;
-    this.comparison.replaceChildren();
-    this.beside?.destroy();
-    this.beside = null;
-    if (other === null) return undefined;
-    const close = element("button", { type: "button", class: "button small", onclick: () => this.change({ compare: null }) }, "Close");
-    const body = element("div", {}, element("p", { class: "shape-note", role: "status" }, "Loading both shapes…"));
-    this.comparison.append(element("div", { class: "shape-compared-head" }, element("h2", {}, "Side by side"), close), body);
-    try {
-      const { compareShapes } = await import("./shape_compare.js");
-      const beside = await compareShapes(body, this.id, other);
-      if (this.view.compare !== other) return beside.destroy();
-      this.beside = beside;
-      this.comparison.scrollIntoView({ block: "nearest" });
-    } catch (error) {
-      body.replaceChildren(element("p", { class: "shape-note" }, error.message));
-    }
-    return undefined;
-  }
-
   destroy() {
     this.stopTheme();
     this.stage.destroy();
-    this.beside?.destroy();
+    this.beside.destroy();
   }
 }

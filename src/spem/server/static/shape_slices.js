@@ -176,6 +176,26 @@ export class Slices {
     for (const slice of this.slices) if (slice.place !== undefined) slice.draw(this.node, this.marks);
   }
 
+  /** Say what is seen. */
+  describe(text) {
+    this.root.setAttribute("aria-label", text);
+  }
+
+  /** The slices beside each other as one canvas. */
+  drawn() {
+    this.draw();
+    const canvases = this.slices.map(({ canvas }) => canvas);
+    const all = document.createElement("canvas");
+    all.width = canvases.reduce((sum, { width }) => sum + width, 0);
+    all.height = Math.max(...canvases.map(({ height }) => height));
+    let left = 0;
+    for (const canvas of canvases) {
+      all.getContext("2d").drawImage(canvas, left, 0);
+      left += canvas.width;
+    }
+    return all;
+  }
+
   destroy() {
     this.watcher.disconnect();
   }

@@ -2,7 +2,7 @@
 
 import { element } from "./dom.js";
 import { isDark, shares } from "./colours.js";
-import { faceUnder, principalView, times, turn, vertexNormals } from "./shape_camera.js";
+import { extents, faceUnder, principalView, times, turn, vertexNormals } from "./shape_camera.js";
 import { Graphics } from "./shape_gl.js";
 import { fitCanvas } from "./shape_raster.js";
 
@@ -39,7 +39,7 @@ export class Surface {
     this.first = principalView(this.nodePoints());
     this.rotation = this.first;
     this.zoom = 1;
-    this.fit();
+    Object.assign(this, extents(this.scaled, this.first));
     Object.assign(this, { marks: [], node: null, source: null, heard: { onNode, onSource, onHover } });
     this.buttons = element(
       "div",
@@ -72,28 +72,6 @@ export class Surface {
       }
     }
     return near;
-  }
-
-  /** Middle and radius of the surface as it is first seen. */
-  fit() {
-    const low = [Infinity, Infinity, Infinity];
-    const high = [-Infinity, -Infinity, -Infinity];
-    for (let i = 0; i < this.scaled.length; i += 1) {
-      low[i % 3] = Math.min(low[i % 3], this.scaled[i]);
-      high[i % 3] = Math.max(high[i % 3], this.scaled[i]);
-    }
-    this.centre = low.map((value, axis) => (value + high[axis]) / 2);
-    const extent = [0, 0];
-    this.radius = 0;
-    for (let i = 0; i < this.scaled.length; i += 3) {
-      const from = [0, 1, 2].map((axis) => this.scaled[i + axis] - this.centre[axis]);
-      this.radius = Math.max(this.radius, Math.hypot(...from));
-      for (const row of [0, 1]) {
-        const along = Math.abs(from.reduce((sum, value, axis) => sum + this.first[3 * row + axis] * value, 0));
-        extent[row] = Math.max(extent[row], along);
-      }
-    }
-    this.extent = extent;
   }
 
   listen() {
