@@ -5,6 +5,8 @@ from __future__ import annotations
 import socket
 import sys
 
+from threadpoolctl import threadpool_limits
+
 from spem.errors import ParameterError
 from spem.index.index import Index
 from spem.server.app import create_app
@@ -62,5 +64,6 @@ def run(index: Index, options: ServerOptions, opened: socket.socket) -> None:
         timeout_graceful_shutdown=max(1, round(options.finish_seconds)),
     )
     configure()
-    with opened:
+    # Products of search are small; threads of their own would only get in the way of those of requests.
+    with opened, threadpool_limits(1):
         uvicorn.Server(config).run(sockets=[opened])
