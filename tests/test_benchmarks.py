@@ -16,6 +16,7 @@ KEYS = {"benchmark", "quick", "machine", "facts", "tables", "targets", "skipped"
 WITHOUT_DATA = (
     "convergence",
     "geodesics",
+    "index_kill",
     "parts_silhouettes",
     "patches",
     "source_accuracy",
