@@ -120,6 +120,7 @@ class Jobs:
             msg = f"no job of kind {kind!r}; expected one of {', '.join(self._steps)}"
             raise ParameterError(msg)
         job = Job(secrets.token_hex(_ID_BYTES), kind, dict(header), time.time())
+        self._sweep()
         with self._changed:
             self._check_room()
             # holds its place while the file is written
@@ -192,7 +193,8 @@ class Jobs:
                 self._stops[job_id].set()
                 return True
             self._waiting.remove(job_id)
-            self._put(job.with_(state="cancelled", finished=time.time()))
+            job = self._put(job.with_(state="cancelled", finished=time.time()))
+        self._save(job)
         self._spool.drop_payload(job_id)
         return True
 
@@ -233,17 +235,23 @@ class Jobs:
         """Run one job after another until the server goes down."""
         while True:
             with self._changed:
-                while not self._closing and not self._next_ready():
+                if not self._closing and not self._next_ready():
                     self._changed.wait(_SWEEP)
-                    self._sweep()
                 if self._closing:
                     return
-                job = self._jobs[self._waiting.popleft()]
-                job = job.with_(state="running", started=time.time(), attempts=job.attempts + 1)
-                self._put(job)
+                job = self._begin() if self._next_ready() else None
+            self._sweep()
+            if job is None:
+                continue
+            self._save(job)
             began = time.monotonic()
             self._run(job)
             self._mean_seconds += 0.2 * (time.monotonic() - began - self._mean_seconds)
+
+    def _begin(self) -> Job:
+        """Take the next job out of the queue."""
+        job = self._jobs[self._waiting.popleft()]
+        return self._put(job.with_(state="running", started=time.time(), attempts=job.attempts + 1))
 
     def _next_ready(self) -> bool:
         """Tell whether a job waits whose file is written."""
@@ -268,8 +276,7 @@ class Jobs:
             if not isinstance(error, SpemError):
                 _log.exception("job %s", job.id)
             over = job.with_(state="failed", error=one_line(error))
-        with self._changed:
-            self._put(over.with_(finished=time.time()))
+        self._save(self._put(over.with_(finished=time.time())))
         self._spool.drop_payload(job.id)
 
     def _encode(self, job: Job) -> list[Row]:
@@ -290,15 +297,16 @@ class Jobs:
     def _stopped(self, job: Job, error: SandboxError) -> Job | None:
         """Say what becomes of a job whose task was stopped; None when it waits again."""
         if error.reason == "closed" or (error.reason == "cancelled" and self._requeue):
-            with self._changed:
-                # that the server goes down is no fault of the job
-                self._put(job.with_(state="queued", attempts=job.attempts - 1))
+            # that the server goes down is no fault of the job
+            self._save(self._put(job.with_(state="queued", attempts=job.attempts - 1)))
             return None
         if error.reason == "cancelled":
             return job.with_(state="cancelled")
         if error.reason == "died" and job.attempts < _MOST_ATTEMPTS:
+            again = job.with_(state="queued", stage="again")
+            self._save(again)
             with self._changed:
-                self._put(job.with_(state="queued", stage="again"))
+                self._put(again)
                 self._waiting.appendleft(job.id)
                 self._changed.notify()
             return None
@@ -314,19 +322,24 @@ class Jobs:
                 why = (
                     f"given up after {job.attempts} attempts, which the server or its worker did not survive"
                 )
-                self._put(job.with_(state="failed", error=why, finished=time.time()))
+                self._save(self._put(job.with_(state="failed", error=why, finished=time.time())))
                 self._spool.drop_payload(job.id)
                 continue
-            self._put(job.with_(state="queued", stage="", progress=0.0))
+            self._save(self._put(job.with_(state="queued", stage="", progress=0.0)))
             self._waiting.append(job.id)
             self._stops[job.id] = threading.Event()
         self._sweep()
 
-    def _put(self, job: Job) -> None:
-        """Note a change of state in memory and in the spool."""
-        self._jobs[job.id] = job
-        if job.state in OVER:
-            self._stops.pop(job.id, None)
+    def _put(self, job: Job) -> Job:
+        """Note a change of state in memory."""
+        with self._changed:
+            self._jobs[job.id] = job
+            if job.state in OVER:
+                self._stops.pop(job.id, None)
+        return job
+
+    def _save(self, job: Job) -> None:
+        """Note a change of state in the spool, outside the lock: a disk may take its time."""
         try:
             self._spool.save(job)
         except SpemError as error:
@@ -341,7 +354,6 @@ class Jobs:
 
     def _check_room(self) -> None:
         """Refuse another job when too many wait, or the server goes down."""
-        self._sweep()
         if self._closing:
             msg = "the server is going down; try again later"
             raise QueueFullError(msg, _GUESS)
@@ -351,11 +363,9 @@ class Jobs:
 
     def _sweep(self) -> None:
         """Forget jobs that were finished long ago, and the oldest of too many."""
-        over = sorted(
-            (job for job in self._jobs.values() if job.state in OVER),
-            key=lambda job: job.finished,
-            reverse=True,
-        )
+        with self._changed:
+            over = [job for job in self._jobs.values() if job.state in OVER]
+        over.sort(key=lambda job: job.finished, reverse=True)
         limit = time.time() - self._keep_seconds
         for place, job in enumerate(over):
             if place >= self._keep or job.finished < limit:

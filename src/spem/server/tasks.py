@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import os
+import math
 from collections.abc import Callable, Mapping
 from contextvars import ContextVar
 from dataclasses import replace
@@ -17,18 +17,17 @@ from numpy.typing import NDArray
 
 from spem.codes.model import Model
 from spem.codes.sources import read_shapes, source_name
-from spem.errors import ModelError, ShapeError, SpemError
+from spem.errors import ModelError, ShapeError, SizeError, SpemError
 from spem.index.encoding import row_of
 from spem.index.row import Row, unpack
 from spem.server.uploads import check_content, check_members, safe_name, upload_suffix
+from spem.shapes.limits import memory_limit_bytes
 
 Reply: TypeAlias = tuple[dict[str, Any], dict[str, NDArray[Any]]]
 Task: TypeAlias = Callable[[dict[str, Any], bytes], Reply]
 
 # Called with a stage and the share of the task that is done when it begins.
 listener: ContextVar[Callable[[str, float], None]] = ContextVar("listener", default=lambda *_: None)
-# What readers hold at most for one voxel or pixel.
-_BYTES_PER_VOXEL = 28
 _MOST_LABELS = 256
 _TEXT = ("id", "hash", "name", "path", "label", "ndim", "n_nodes", "volume")
 
@@ -40,8 +39,8 @@ def encode(header: dict[str, Any], payload: bytes) -> Reply:
     ----------
     header
         ``name`` of the upload and ``model_file``, where the model lies; it may have ``title``, the name for
-        people, ``voxels``, the most cells that a grid or a picture may have, and ``expanded``, the most bytes
-        that a packed volume may expand to.
+        people, and ``voxels``, the most voxels that a shape may have inside. Packed volumes may expand to the
+        memory limit of the readers.
     payload
         The bytes of the file.
 
@@ -51,7 +50,7 @@ def encode(header: dict[str, Any], payload: bytes) -> Reply:
         When it is an archive, cannot be read, or has a shape that cannot be coded.
     """
     name, suffix = str(header["name"]), upload_suffix(str(header["name"]))
-    shown, most = safe_name(name), int(header.get("expanded", 1 << 30))
+    shown, most = safe_name(name), memory_limit_bytes()
     check_content(name, payload, most)
     # in the folder of the task, under a name of ours: nothing of the client's reaches the file system
     file = Path("upload" + suffix)
@@ -128,7 +127,6 @@ TASKS: Mapping[str, Task] = {"encode": encode, "view": view, "words": words}
 
 def _rows(file: Path, model: Model, shown: str, header: Mapping[str, Any]) -> list[Row]:
     """Read the shapes of a file and code them."""
-    _limit_voxels(header.get("voxels"))
     key = hashlib.sha256(file.read_bytes()).hexdigest()
     title = str(header.get("title") or source_name(Path(shown)))
     tell = listener.get()
@@ -137,6 +135,11 @@ def _rows(file: Path, model: Model, shown: str, header: Mapping[str, Any]) -> li
     for suffix, shape in read_shapes(file, model.settings):
         if isinstance(shape, SpemError):
             raise shape
+        if shape.n_nodes > header.get("voxels", math.inf):
+            msg = (
+                f"{shown}: {shape.n_nodes} voxels inside, the limit is {header['voxels']}; send a coarser one"
+            )
+            raise SizeError(msg)
         found.append((suffix, shape))
         if len(found) > _MOST_LABELS:
             msg = f"{shown}: holds more than {_MOST_LABELS} labels; send fewer at a time"
@@ -146,14 +149,6 @@ def _rows(file: Path, model: Model, shown: str, header: Mapping[str, Any]) -> li
         tell("coding", 0.3 + 0.7 * done / len(found))
         rows.append(row_of(shape, model, key, suffix, title + suffix, shown))
     return [replace(row, report={**row.report, "source": shown}) for row in rows]
-
-
-def _limit_voxels(voxels: int | None) -> None:
-    """Set the memory limit of the readers to so many voxels."""
-    if voxels is None:
-        os.environ.pop("SPEM_MEMORY_LIMIT", None)
-    else:
-        os.environ["SPEM_MEMORY_LIMIT"] = str(_BYTES_PER_VOXEL * voxels)
 
 
 @lru_cache(maxsize=4)

@@ -141,6 +141,8 @@ def _limit_time(seconds: float) -> None:
 def _confine(memory_limit: int) -> None:
     """Set the limits that hold from the start."""
     os.umask(0o077)
+    # what readers refuse by a header is told in a clearer way than what runs into the limit
+    os.environ["SPEM_MEMORY_LIMIT"] = str(memory_limit // 2)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (memory_limit, memory_limit))
     resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
