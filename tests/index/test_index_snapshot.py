@@ -11,21 +11,27 @@ import pytest
 from spem.codes.model import Model
 from spem.index import snapshot
 from spem.index.index import Index
+from spem.index.pinned import Pinned
 from spem.index.row import Row
-from spem.index.snapshot import Snapshots, read, renewed
+from spem.index.snapshot import Snapshot, Snapshots, read, renewed
 from spem.index.updates import write
+
+
+def _of(kept: Snapshots, index: Index, digest: str) -> Snapshot | None:
+    """Return the snapshot of a table as it is now."""
+    return kept.of(kept.pinned(index.store, digest), digest)
 
 
 def test_a_snapshot_is_kept_until_the_table_changes(crowd: Index, ready_row: Callable[..., Row]) -> None:
     """It is read once; after a write there is another, of the new version."""
     kept, digest = Snapshots(), crowd.digest()
-    first = kept.of(crowd.store, digest)
+    first = _of(kept, crowd, digest)
     assert first is not None
-    assert kept.of(crowd.store, digest) is first
+    assert _of(kept, crowd, digest) is first
     write(crowd.store, digest, [ready_row("new")])
-    second = kept.of(crowd.store, digest)
+    second = _of(kept, crowd, digest)
     assert second is not None
-    assert second.version > first.version
+    assert second.pinned.version > first.pinned.version
     assert (len(first.ids), len(second.ids)) == (300, 301)
 
 
@@ -35,14 +41,15 @@ def test_a_renewed_snapshot_is_one_read_anew(
 ) -> None:
     """Added, replaced and removed rows come to the same codes as reading all of them."""
     monkeypatch.setattr(snapshot, "_FETCHED", fetched)
-    table, digest = crowd.store.table(crowd.digest()), crowd.digest()
-    old = read(table)
+    digest = crowd.digest()
+    old = read(Pinned.newest(crowd.store, digest))
     write(
         crowd.store, digest, [ready_row("new"), replace(ready_row("shape 3"), code=ready_row("other").code)]
     )
     write(crowd.store, digest, [ready_row(f"more {i}") for i in range(3)])
     crowd.remove(where="label = '4'")
-    late, fresh = renewed(old, table), read(table)
+    newest = Pinned.newest(crowd.store, digest)
+    late, fresh = renewed(old, newest), read(newest)
     assert len(late.ids) == len(fresh.ids) == 294
     assert np.array_equal(late.ids[late.order], fresh.ids[fresh.order])
     assert np.array_equal(late.vectors[late.order], fresh.vectors[fresh.order])
@@ -53,23 +60,23 @@ def test_memory_bounds_what_is_kept(crowd: Index, tiny_model: Model) -> None:
     """Codes over the budget stay in the database; of two models the one that is asked for is kept."""
     digest = crowd.digest()
     size = 300 * tiny_model.n_code * 4
-    assert Snapshots(size - 1).of(crowd.store, digest) is None
+    assert _of(Snapshots(size - 1), crowd, digest) is None
     kept = Snapshots(size)
     rng = np.random.default_rng(9)
     other = Model.fit(tiny_model.settings, [(rng.random((50, 2)),) for _ in range(3)], ndim=2)
     crowd.store.save_model(other)
-    first = kept.of(crowd.store, digest)
-    assert kept.of(crowd.store, other.digest) is not None
-    assert kept.of(crowd.store, digest) is first
+    first = _of(kept, crowd, digest)
+    assert _of(kept, crowd, other.digest) is not None
+    assert _of(kept, crowd, digest) is first
     row = Row("9f", "9f", "one", "one", np.arange(64, dtype=np.float32))
     write(crowd.store, other.digest, [row])
-    assert kept.of(crowd.store, other.digest) is not None
-    assert kept.of(crowd.store, digest) is not first
+    assert _of(kept, crowd, other.digest) is not None
+    assert _of(kept, crowd, digest) is not first
 
 
 def test_filters_are_remembered(crowd: Index) -> None:
     """The rows of a filter are looked up once, and the oldest filters forgotten."""
-    held = read(crowd.store.table(crowd.digest()))
+    held = read(Pinned.newest(crowd.store, crowd.digest()))
     rows = held.matching("label = '3'")
     assert len(rows) == 10
     assert held.matching("label = '3'") is rows
@@ -80,10 +87,9 @@ def test_filters_are_remembered(crowd: Index) -> None:
 
 def test_records_in_memory_and_from_the_database(crowd: Index, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of many rows only ids are kept, and what answers tell of them is read when it is needed."""
-    table = crowd.store.table(crowd.digest())
-    small = read(table)
+    small = read(Pinned.newest(crowd.store, crowd.digest()))
     monkeypatch.setattr(snapshot, "_ROWS_IN_MEMORY", 10)
-    large = read(table)
+    large = read(Pinned.newest(crowd.store, crowd.digest()))
     assert large.rows is None
     ids = [large.ids[place].decode() for place in (5, 200, 7)]
     found = [[record["name"] for record in one.records(one.positions(ids))] for one in (small, large)]

@@ -22,8 +22,9 @@ _QUERIES, _ANSWERS = 100, 10
 TARGET = 0.97
 # Cells searched, in this order; beyond the last one the nearest are hardly ever missed.
 _PROBES = (8, 16, 32, 64, 128, 256)
-# The compressed codes choose so many times the answers that are compared whole.
-_REFINE = 10
+# The compressed codes choose so many times the answers, which are read and compared whole: most of the time
+# that a search takes.
+_REFINE = 4
 # Lance trains its compression on at least so many codes.
 _LEAST_ROWS = 256
 # Distances of equal codes differ by as much in float32.

@@ -16,8 +16,6 @@ from spem.index.snapshot import Snapshot
 _ROUNDING = 1e-5
 # Numbers of codes that are compared in float64 at a time.
 _BLOCK = 2**20
-# Rows that the database is asked for beyond those wanted, since it compares in float32.
-_SPARE = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,16 +64,18 @@ def in_database(ask: Any, vector: NDArray[np.float32], k: int, where: str | None
     ask
         The search to be made, as LanceDB has it.
     vector, k, where
-        As `in_memory` takes them.
+        As `in_memory` takes them. Of codes as far as the last answer, to seven digits, any may be left out.
     """
     if where is not None:
         ask = ask.where(where, prefilter=True)
     # the distance is named, or LanceDB warns that it will not add it by itself in future
-    records = ask.select([*LIGHT, "vector", "_distance"]).limit(k + _SPARE).to_list()
-    vectors = np.array([record["vector"] for record in records], np.float32).reshape(-1, len(vector))
-    ids = np.array([record["id"].encode() for record in records], np.bytes_)
+    found = ask.select([*LIGHT, "vector", "_distance"]).limit(k).to_arrow()
+    flat = found.column("vector").combine_chunks().flatten().to_numpy(zero_copy_only=False)
+    vectors = flat.reshape(-1, len(vector))
+    ids = np.array([each.encode() for each in found.column("id").to_pylist()], np.bytes_)
     best, distances = nearest(vectors, ids, vector, k)
-    return Nearest(distances, vectors[best], lambda places: [records[at] for at in best[places]])
+    light = found.select(LIGHT)
+    return Nearest(distances, vectors[best], lambda places: list(light.take(best[places]).to_pylist()))
 
 
 def nearest(

@@ -148,13 +148,14 @@ def find_duplicates(
         msg = f"distance={distance}: expected a correlation distance in (0, 1), such as {DISTANCE}"
         raise ParameterError(msg)
     with told(store.address, where=where):
-        snapshot = snapshots.of(store, digest)
+        pinned = snapshots.pinned(store, digest)
+        snapshot = snapshots.of(pinned, digest)
         if snapshot is None:
             msg = f"{store.address}: the codes take over {snapshots.memory} bytes of memory; filter them"
             raise ParameterError(msg)
         places = np.arange(len(snapshot.ids)) if where is None else snapshot.matching(to_sql(where))
         vectors = snapshot.vectors if where is None else snapshot.vectors[places]
-        way = Approximation.of(snapshot.table) if len(places) > EXACT_ROWS else None
+        way = pinned.approximation if len(places) > EXACT_ROWS else None
         pairs = _asked_pairs(way, snapshot, places, limit) if way else near_pairs(vectors, limit)
         found = [_Found.of(vectors, members) for members in components(pairs, len(places))]
         order = sorted(found, key=lambda one: (-len(one.members), snapshot.ids[places[one.members[0]]]))
@@ -268,7 +269,7 @@ def _asked_pairs(
     def ask(place: int) -> NDArray[np.intp]:
         """Return the pairs of one code."""
         # half the squared difference of unit vectors is their distance
-        asked = way.ask(snapshot.table, snapshot.vectors[place]).distance_range(upper_bound=2 * limit)
+        asked = way.ask(snapshot.pinned.table, snapshot.vectors[place]).distance_range(upper_bound=2 * limit)
         ids = asked.select(["id", "_distance"]).limit(_NEIGHBOURS).to_arrow().column("id").to_pylist()
         others = among[snapshot.positions(ids)]
         others = others[(others >= 0) & (others != among[place])]

@@ -259,7 +259,9 @@ class Index:
             When the query is no code, or not a shape, of that model.
         """
         wanted = Search(k, where, exact, rerank, volume_within)
-        return search(self.store, self.snapshots, self.digest(model), query, wanted)
+        known = isinstance(model, str) and self.snapshots.knows(model)
+        digest = str(model) if known else self.digest(model)
+        return search(self.store, self.snapshots, digest, query, wanted)
 
     def duplicates(
         self,

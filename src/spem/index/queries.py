@@ -16,6 +16,7 @@ from spem.codes.model import Model
 from spem.codes.sources import Source, read_shapes
 from spem.errors import ModelError, ParameterError, ReadError, ShapeError, SpemError
 from spem.index.filters import literal
+from spem.index.pinned import Pinned
 from spem.index.row import row_id
 from spem.index.schema import standardised_codes
 from spem.index.snapshot import Snapshot
@@ -50,6 +51,7 @@ def resolve(
     query: str | Path | Shape | NDArray[Any],
     store: Store,
     digest: str,
+    pinned: Pinned,
     snapshot: Snapshot | None,
 ) -> Query:
     """Find the code of a query; only what is not in the index is read and encoded.
@@ -62,6 +64,8 @@ def resolve(
         The database.
     digest
         The model whose table is searched.
+    pinned
+        The table.
     snapshot
         Its codes in memory, where they are.
 
@@ -72,21 +76,19 @@ def resolve(
     ReadError
         When there is neither a file nor a shape of the index of that name.
     """
-    table = snapshot.table if snapshot is not None else store.table(digest)
     if isinstance(query, np.ndarray):
-        return Query(_standardised(query, table))
+        return Query(_standardised(query, pinned.n_code))
     if isinstance(query, Shape):
         return _encoded(query, store.load_model(digest))
     text = str(query)
     if Path(text).is_file():
         key = row_id(file_hash(text))
-        return _row(key, table, snapshot) or _encoded(Path(text), store.load_model(digest))
-    return _row(text, table, snapshot) or _named(text, store.stored(text), table)
+        return _row(key, pinned.table, snapshot) or _encoded(Path(text), store.load_model(digest))
+    return _row(text, pinned.table, snapshot) or _named(text, store.stored(text), pinned.table)
 
 
-def _standardised(code: NDArray[Any], table: Any) -> NDArray[np.float32]:
+def _standardised(code: NDArray[Any], n_code: int) -> NDArray[np.float32]:
     """Return a code as the database has it, or refuse it."""
-    n_code = table.schema.field("vector").type.list_size
     if code.shape != (n_code,) or not np.isfinite(code).all():
         msg = (
             f"a code of shape {code.shape}, expected {n_code} finite numbers; make it with the index's model"

@@ -17,6 +17,7 @@ from spem.index.comparison import in_database, in_memory
 from spem.index.database_errors import told
 from spem.index.diffused import NEIGHBOURHOOD, diffused
 from spem.index.filters import to_sql
+from spem.index.pinned import Pinned
 from spem.index.queries import Query, resolve
 from spem.index.snapshot import Snapshots
 from spem.index.store import Store
@@ -103,16 +104,16 @@ def search(
         When the query or the filter has no meaning, or the index cannot be read.
     """
     with told(store.address, where=wanted.where):
-        table = store.table(digest)
-        way = None if wanted.exact else _approximation(table, wanted.exact, store.address)
-        snapshot = None if way else snapshots.of(store, digest)
-        found = resolve(query, store, digest, snapshot)
+        pinned = snapshots.pinned(store, digest)
+        way = _approximation(pinned, wanted.exact, store.address)
+        snapshot = None if way else snapshots.of(pinned, digest)
+        found = resolve(query, store, digest, pinned, snapshot)
         where = wanted.filter(found)
         count = max(wanted.k, NEIGHBOURHOOD) if wanted.rerank else wanted.k
         if snapshot is not None:
             near = in_memory(snapshot, found.vector, count, where)
         else:
-            ask = way.ask(table, found.vector) if way else exhaustive(table, found.vector)
+            ask = way.ask(pinned.table, found.vector) if way else exhaustive(pinned.table, found.vector)
             near = in_database(ask, found.vector, count, where)
         method = "approximate" if way else "exact"
         if wanted.rerank:
@@ -123,12 +124,11 @@ def search(
     return Answers(answers, method, digest, way.recall if way else None)
 
 
-def _approximation(table: Any, exact: bool | None, address: str) -> Approximation | None:
+def _approximation(pinned: Pinned, exact: bool | None, address: str) -> Approximation | None:
     """Return the approximate index to ask, or None where all codes are to be compared."""
-    if exact is None and table.count_rows() <= EXACT_ROWS:
+    if exact or (exact is None and pinned.n_rows <= EXACT_ROWS):
         return None
-    way = Approximation.of(table)
-    if way is None and exact is False:
+    if pinned.approximation is None and exact is False:
         msg = f"{address}: no approximate index; make it with: spem index optimize {address} --approximate"
         raise ParameterError(msg)
-    return way
+    return pinned.approximation

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.index.extra import require
+from spem.index.pinned import Pinned
 from spem.index.schema import LIGHT
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class Snapshot:
 
     Parameters
     ----------
-    table
+    pinned
         The table, at that version.
     ids
         ``(n,)`` ids as bytes, in the order of the table.
@@ -48,18 +49,13 @@ class Snapshot:
         What answers tell of each shape; None where it is left in the database.
     """
 
-    table: Any
+    pinned: Pinned
     ids: NDArray[np.bytes_]
     stamps: NDArray[np.int64]
     vectors: NDArray[np.float32]
     rows: pyarrow.Table | None
     _filters: OrderedDict[str, NDArray[np.intp]] = field(default_factory=OrderedDict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
-
-    @cached_property
-    def version(self) -> int:
-        """Version of the table."""
-        return int(self.table.version)
 
     @cached_property
     def order(self) -> NDArray[np.intp]:
@@ -77,7 +73,7 @@ class Snapshot:
             if held is not None:
                 self._filters.move_to_end(where)
                 return held
-        found = self.table.search().where(where).select(["id"]).to_arrow()
+        found = self.pinned.table.search().where(where).select(["id"]).to_arrow()
         rows = np.sort(self.positions(found.column("id").to_pylist()))
         with self._lock:
             self._filters[where] = rows
@@ -90,7 +86,7 @@ class Snapshot:
         if self.rows is not None:
             return list(self.rows.take(places.astype(np.int64)).to_pylist())
         ids = [self.ids[place].decode() for place in places]
-        known = {record["id"]: record for record in _search_ids(self.table, ids, LIGHT).to_pylist()}
+        known = {record["id"]: record for record in _search_ids(self.pinned.table, ids, LIGHT).to_pylist()}
         return [known[each] for each in ids]
 
 
@@ -106,81 +102,90 @@ class Snapshots:
     def __init__(self, memory: int = DEFAULT_MEMORY) -> None:
         self.memory = memory
         self._held: dict[str, Snapshot] = {}
+        self._pinned: dict[str, Pinned] = {}
         self._lock = threading.Lock()
 
-    def of(self, store: Store, digest: str) -> Snapshot | None:
-        """Return the codes of a model as they are in the database now, or None where they are too many.
+    def knows(self, digest: str) -> bool:
+        """Tell whether a model has been searched before."""
+        return digest in self._pinned
+
+    def pinned(self, store: Store, digest: str) -> Pinned:
+        """Return the table of a model as it is in the database now."""
+        held = self._pinned.get(digest)
+        if held is None or held.version != store.table(digest).version:
+            held = self._pinned[digest] = Pinned.newest(store, digest)
+        return held
+
+    def of(self, pinned: Pinned, digest: str) -> Snapshot | None:
+        """Return the codes of a table, or None where they are too many.
 
         Parameters
         ----------
-        store
-            The database.
+        pinned
+            The table.
         digest
-            The model.
+            Its model.
         """
         held = self._held.get(digest)
-        if held is not None and held.version == store.table(digest).version:
+        if held is not None and held.pinned.version >= pinned.version:
             return held
         with self._lock:
-            table = _pinned(store, digest)
             held = self._held.get(digest)
-            if held is not None and held.version == table.version:
+            if held is not None and held.pinned.version >= pinned.version:
                 return held
-            size = table.count_rows() * _n_code(table) * _FLOAT
+            size = pinned.n_rows * pinned.n_code * _FLOAT
             if size > self.memory:
                 self._held.pop(digest, None)
                 return None
             others = sum(one.vectors.nbytes for name, one in self._held.items() if name != digest)
             if size + others > self.memory:
                 self._held = {name: one for name, one in self._held.items() if name == digest}
-            self._held[digest] = read(table) if held is None else renewed(held, table)
+            self._held[digest] = read(pinned) if held is None else renewed(held, pinned)
             return self._held[digest]
 
 
-def _pinned(store: Store, digest: str) -> Any:
-    """Open the table of a model at its newest version, and stay there whatever is written."""
-    table = store.database.open_table(store.table(digest).name)
-    table.checkout(table.version)
-    return table
-
-
-def read(table: Any) -> Snapshot:
+def read(pinned: Pinned) -> Snapshot:
     """Read the codes of a table."""
     pa = require("pyarrow")
-    n, n_code = int(table.count_rows()), _n_code(table)
-    columns = LIGHT if n <= _ROWS_IN_MEMORY else ("id", "added")
-    vectors, light, done = np.empty((n, n_code), np.float32), [], 0
-    for batch in table.search().select([*columns, "vector"]).to_batches():
-        flat = batch.column("vector").flatten().to_numpy(zero_copy_only=False)
-        vectors[done : done + len(batch)] = flat.reshape(-1, n_code)
+    columns = _columns(pinned)
+    vectors, light, done = np.empty((pinned.n_rows, pinned.n_code), np.float32), [], 0
+    for batch in pinned.table.search().select([*columns, "vector"]).to_batches():
+        vectors[done : done + len(batch)] = _codes(batch, pinned.n_code)
         light.append(batch.select(columns))
         done += len(batch)
-    rows = pa.Table.from_batches(light) if light else table.schema.empty_table().select(columns)
-    return _snapshot(table, rows.combine_chunks(), vectors)
+    rows = pa.Table.from_batches(light) if light else pinned.table.schema.empty_table().select(columns)
+    return _snapshot(pinned, rows.combine_chunks(), vectors)
 
 
-def renewed(old: Snapshot, table: Any) -> Snapshot:
+def renewed(old: Snapshot, pinned: Pinned) -> Snapshot:
     """Return the snapshot of a later version of a table; codes that stay are not read again."""
-    n = int(table.count_rows())
-    columns = list(LIGHT if n <= _ROWS_IN_MEMORY else ("id", "added"))
-    rows = table.search().select(columns).to_arrow().combine_chunks()
+    rows = pinned.table.search().select(_columns(pinned)).to_arrow().combine_chunks()
     ids, stamps = _ids(rows), _stamps(rows)
     source = _positions(old.ids, old.order, ids, missing=-1)
-    source[source >= 0] = np.where(
-        old.stamps[source[source >= 0]] == stamps[source >= 0], source[source >= 0], -1
-    )
+    if len(old.ids):
+        source[old.stamps[source] != stamps] = -1
     new = np.flatnonzero(source < 0)
     if len(new) > _FETCHED:
-        return read(table)
-    vectors = np.empty((len(ids), old.vectors.shape[1]), np.float32)
-    if len(old.ids):
-        vectors[:] = old.vectors[np.maximum(source, 0)]
+        return read(pinned)
+    vectors = np.empty((len(ids), pinned.n_code), np.float32)
+    vectors[source >= 0] = old.vectors[source[source >= 0]]
     if len(new):
-        fetched = _search_ids(table, [ids[place].decode() for place in new], ["id", "vector"])
-        at = _positions(ids, np.argsort(ids, kind="stable"), _as_bytes(fetched.column("id").to_pylist()))
-        flat = fetched.column("vector").combine_chunks().flatten().to_numpy(zero_copy_only=False)
-        vectors[at] = flat.reshape(-1, vectors.shape[1])
-    return _snapshot(table, rows, vectors)
+        fetched = _search_ids(pinned.table, [ids[place].decode() for place in new], ["id", "vector"])
+        at = _positions(ids, np.argsort(ids, kind="stable"), _ids(fetched))
+        vectors[at] = _codes(fetched.combine_chunks(), pinned.n_code)
+    return _snapshot(pinned, rows, vectors)
+
+
+def _columns(pinned: Pinned) -> list[str]:
+    """Return the columns that are kept in memory: of many rows what tells whether they are the same."""
+    return list(LIGHT) if pinned.n_rows <= _ROWS_IN_MEMORY else ["id", "added"]
+
+
+def _codes(rows: Any, n_code: int) -> NDArray[np.float32]:
+    """Return the codes of a batch of rows, or of a table in one piece."""
+    column = rows.column("vector")
+    column = column.combine_chunks() if hasattr(column, "combine_chunks") else column
+    return np.asarray(column.flatten().to_numpy(zero_copy_only=False), np.float32).reshape(-1, n_code)
 
 
 def _search_ids(table: Any, ids: Sequence[str], columns: Sequence[str]) -> pyarrow.Table:
@@ -189,15 +194,10 @@ def _search_ids(table: Any, ids: Sequence[str], columns: Sequence[str]) -> pyarr
     return table.search().where(f"id IN ({listed or 'NULL'})").select(list(columns)).to_arrow()
 
 
-def _snapshot(table: Any, rows: pyarrow.Table, vectors: NDArray[np.float32]) -> Snapshot:
+def _snapshot(pinned: Pinned, rows: pyarrow.Table, vectors: NDArray[np.float32]) -> Snapshot:
     """Put a snapshot together; many rows keep only their ids."""
     kept = rows if rows.num_columns == len(LIGHT) else None
-    return Snapshot(table, _ids(rows), _stamps(rows), vectors, kept)
-
-
-def _n_code(table: Any) -> int:
-    """Return the length of the codes of a table."""
-    return int(table.schema.field("vector").type.list_size)
+    return Snapshot(pinned, _ids(rows), _stamps(rows), vectors, kept)
 
 
 def _ids(rows: pyarrow.Table) -> NDArray[np.bytes_]:
