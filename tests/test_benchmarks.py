@@ -25,6 +25,7 @@ WITHOUT_DATA = (
     "startup",
     "sweep_accuracy",
     "sweep_scaling",
+    "views",
 )
 
 
