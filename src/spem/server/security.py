@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
+import re
 from collections.abc import Iterable, Mapping
 
 from spem.server.refusals import Refusal
@@ -21,6 +22,8 @@ HEADERS: tuple[tuple[bytes, bytes], ...] = (
     (b"cross-origin-resource-policy", b"same-origin"),
     (b"permissions-policy", b"camera=(), geolocation=(), microphone=()"),
 )
+# A name or an address, and perhaps a port.
+_HOST = re.compile(r"(\[[0-9a-f:.]+\]|[\w.-]+)(?::\d{0,5})?", re.ASCII)
 _READING = ("GET", "HEAD", "OPTIONS")
 _OWN = (b"same-origin", b"none")
 
@@ -64,11 +67,8 @@ def host_allowed(host: bytes, names: Iterable[str]) -> bool:
     (True, False)
     """
     name = host.decode("latin-1").lower()
-    if name.startswith("["):
-        name, closed, _ = name[1:].partition("]")
-        return bool(closed) and _is_address(name)
-    name = name.rpartition(":")[0] if name.count(":") == 1 else name
-    return name in names or _is_address(name)
+    parts = _HOST.fullmatch(name)
+    return parts is not None and (parts[1] in names or _is_address(parts[1].strip("[]")))
 
 
 def _is_address(text: str) -> bool:
