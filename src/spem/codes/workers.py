@@ -22,6 +22,8 @@ T = TypeVar("T")
 R = TypeVar("R")
 # A process takes seconds to start, as long as it takes to code this many shapes.
 _SHAPES_PER_PROCESS = 100
+# Tasks for each process that are under way or handed out, and tried alone when one of them kills its process.
+_SUSPECTS = 3
 # Seconds between two looks of a worker at its parent.
 _PARENT_CHECK = 0.5
 
@@ -90,17 +92,24 @@ def run_all(work: Callable[[T], R], tasks: Iterable[T], n_jobs: int = 1) -> Iter
             for task in left.values():
                 yield task, *_attempt(work, task)
         return
+    while left:
+        try:
+            for index, result, reason in _spread(work, left, n_jobs):
+                yield left.pop(index), result, reason
+        except TerminatedWorkerError:
+            # One task took its process down and the pool with it, one of those that were handed out first.
+            for index in list(left)[: _SUSPECTS * n_jobs]:
+                yield left[index], *_alone(work, left, index)
+                del left[index]
+
+
+def _alone(work: Callable[[T], R], tasks: dict[int, T], index: int) -> tuple[R | None, str]:
+    """Run one task with nothing beside it."""
     try:
-        for index, result, reason in _spread(work, left, n_jobs):
-            yield left.pop(index), result, reason
+        [(_, result, reason)] = list(_spread(work, {index: tasks[index]}, 2))
     except TerminatedWorkerError:
-        # One task took its process down and the pool with it: the rest runs one task a pool.
-        for index in list(left):
-            try:
-                [(_, result, reason)] = list(_spread(work, {index: left[index]}, 2))
-            except TerminatedWorkerError:
-                result, reason = None, "its process died, perhaps for want of memory"
-            yield left.pop(index), result, reason
+        return None, "its process died, perhaps for want of memory"
+    return result, reason
 
 
 def _spread(work: Callable[[T], R], tasks: dict[int, T], n_jobs: int) -> Iterator[tuple[int, R | None, str]]:
