@@ -3,12 +3,13 @@
 Codes are made, with the statistics of real ones: codes of SHREC'11 as section 5.5 has them (six maps, 32
 words, 192 numbers; 15,000 voxels a shape) give the mean and the covariance of the classes and of the shapes
 around them, shrunk after Ledoit and Wolf, and how much wider some shapes stray than others. Two collections
-are drawn: ``many classes`` of twenty shapes each, as SHREC'11 has them, and ``30 classes`` however many shapes
-there are, where tens of thousands are nearly as near. The queries are of the same laws, and in no table.
+are drawn: ``many classes`` of twenty shapes each, as SHREC'11 has them, and ``30 classes`` however many
+shapes there are, where tens of thousands are nearly as near. The queries are of the same laws, and not in the
+collection.
 
-The index that spem builds is held against all codes: time, disk, recall@10 against exact search, and times of whole calls of `Index.search`, by one
-client and by eight threads at once. Kinds of approximate index are compared on a part of the harder collection.
-Exact search is timed on 100,000 codes, and on longer ones.
+The index that spem builds is held against all codes: time, disk, recall@10 against exact search, and times of
+whole calls of `Index.search`, by one client and by eight threads at once. Kinds of approximate index are
+compared on a part of the harder collection. Exact search is timed on 100,000 codes, and on longer ones.
 """
 
 from __future__ import annotations
