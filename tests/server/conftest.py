@@ -1,4 +1,4 @@
-"""A running server on a small made collection, and a browser to look at it with; one of each for all tests."""
+"""A running server on a small made collection, and a browser to look at it; one of each for all tests."""
 
 from __future__ import annotations
 
@@ -115,6 +115,7 @@ def browser() -> Iterator[Any]:
     found = os.environ.get("SPEM_BROWSER") or next(filter(None, map(shutil.which, _BROWSERS)), None)
     if found is None:
         pytest.skip(f"no browser: install one of {', '.join(_BROWSERS)}, or set SPEM_BROWSER to its path")
+    playwright.expect.set_options(timeout=15_000)
     with playwright.sync_playwright() as driver:
         started = driver.chromium.launch(executable_path=found, args=list(_ARGUMENTS))
         yield started

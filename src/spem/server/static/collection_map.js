@@ -62,7 +62,8 @@ function arranged(points) {
     y: (point.y - vertical.middle) / unit,
     place: place.get(point.label),
   }));
-  return { points: moved, labels: labels.some(({ label }) => label) ? labels : [] };
+  const extent = [horizontal.half / unit, vertical.half / unit];
+  return { points: moved, extent, labels: labels.some(({ label }) => label) ? labels : [] };
 }
 
 class CollectionMap {
@@ -71,7 +72,7 @@ class CollectionMap {
     Object.assign(this, arranged(points));
     this.build();
     this.settled = debounced(() => this.settle(), 150);
-    this.view = new MapView(this.canvas, {
+    this.view = new MapView(this.canvas, this.extent, {
       onMove: () => this.moved(),
       onHover: (place, entered) => this.hover(place, entered),
       onPick: (place, touched) => this.choose(place, touched),
@@ -152,7 +153,7 @@ class CollectionMap {
     if (!this.canvas.isConnected) return;
     this.setState({ view: this.view.write() });
     const { clientWidth, clientHeight } = this.canvas;
-    const inside = (this.picture.placed ?? []).filter(({ px, py }) => px >= 0 && py >= 0 && px <= clientWidth && py <= clientHeight);
+    const inside = this.picture.inView().filter(({ px, py }) => px >= 0 && py >= 0 && px <= clientWidth && py <= clientHeight);
     const named = inside.map(({ point }) => point).sort((a, b) => a.name.localeCompare(b.name, "en", { numeric: true }));
     this.listTitle.textContent = `In view: ${named.length.toLocaleString("en")}`;
     this.list.replaceChildren(...named.slice(0, LISTED).map((point) => this.entry(point)));

@@ -20,7 +20,7 @@ export function legend(labels, picture, onChoose) {
       element("span", { class: "facts" }, n.toLocaleString("en")),
     );
   });
-  const all = element("button", { type: "button", class: "button small quiet", hidden: true, onclick: () => onChoose(null) }, "Show all");
+  const all = element("button", { type: "button", class: "button small quiet", hidden: true, onclick: () => onChoose(null) }, "All labels");
   const list = element("ul", { class: "legend", role: "list" }, buttons.map((button) => element("li", {}, button)));
   const title = element("div", { class: "legend-title" }, element("h2", { id: "legend-title" }, "Labels"), all);
   const box = element("section", { class: "map-section", "aria-labelledby": "legend-title", hidden: !labels.length }, title, list);

@@ -4,7 +4,8 @@ import { thumbnail } from "./api.js";
 import { sprite, style } from "./markers.js";
 
 const LARGEST = 6.5;
-const PICTURE = 56;
+const PICTURES = [72, 56, 40];
+const MARGIN = PICTURES[0];
 const MOST_PICTURES = 120;
 const REACH = 16;
 
@@ -74,13 +75,12 @@ export class MapPicture {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     this.size();
-    this.placed = this.inView(width, height);
-    const pictured = this.pictures ? this.roomy() : new Set();
+    this.placed = this.inView();
+    const pictured = this.pictures ? this.pictured() : new Set();
     for (const spot of this.placed) if (!pictured.has(spot)) this.dot(context, spot);
     for (const spot of pictured) this.paintPicture(context, spot);
     const spot = this.marked && this.placed.find(({ point }) => point === this.marked);
     if (spot) this.ring(context, spot);
-    canvas.dataset.painted = String(this.placed.length);
   }
 
   dot(context, { point, px, py }) {
@@ -89,39 +89,44 @@ export class MapPicture {
     context.drawImage(image, px - side / 2, py - side / 2, side, side);
   }
 
-  inView(width, height) {
+  /** The points in view, or nearly, with their places on the canvas. */
+  inView() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
     const placed = [];
     for (const point of this.shown) {
       const [px, py] = this.view.toScreen(point.x, point.y);
-      if (px > -PICTURE && py > -PICTURE && px < width + PICTURE && py < height + PICTURE) placed.push({ point, px, py });
+      if (px > -MARGIN && py > -MARGIN && px < width + MARGIN && py < height + MARGIN) placed.push({ point, px, py });
     }
     return placed;
   }
 
-  /** The points that have the square of a picture about them to themselves. */
-  roomy() {
+  /** The points that get a picture: as large as half of them have room for, or as small as can be made out. */
+  pictured() {
+    let roomy;
+    for (const side of PICTURES) {
+      this.side = side;
+      roomy = this.roomy(side);
+      if (2 * roomy.size >= Math.min(this.placed.length, MOST_PICTURES)) break;
+    }
+    return roomy;
+  }
+
+  /** The points that have a square of this side about them nearly to themselves. */
+  roomy(side) {
     const cells = new Map();
-    const key = (px, py) => Math.floor(px / PICTURE) * 4096 + Math.floor(py / PICTURE);
+    const key = (px, py) => Math.floor(px / side) * 4096 + Math.floor(py / side);
     for (const spot of this.placed) {
       const at = key(spot.px, spot.py);
       if (cells.has(at)) cells.get(at).push(spot);
       else cells.set(at, [spot]);
     }
-    const alone = (spot) => {
-      for (const dx of [-PICTURE, 0, PICTURE]) {
-        for (const dy of [-PICTURE, 0, PICTURE]) {
-          for (const other of cells.get(key(spot.px + dx, spot.py + dy)) ?? []) {
-            const apart = Math.max(Math.abs(other.px - spot.px), Math.abs(other.py - spot.py));
-            if (other !== spot && apart < PICTURE * 0.75) return false;
-          }
-        }
-      }
-      return true;
-    };
+    const steps = [-side, 0, side].flatMap((dx) => [-side, 0, side].map((dy) => [dx, dy]));
+    const near = ({ px, py }) => steps.flatMap(([dx, dy]) => cells.get(key(px + dx, py + dy)) ?? []);
+    const apart = (a, b) => Math.max(Math.abs(a.px - b.px), Math.abs(a.py - b.py));
     const roomy = new Set();
     for (const spot of this.placed) {
       if (roomy.size >= MOST_PICTURES) break;
-      if (alone(spot)) roomy.add(spot);
+      if (near(spot).every((other) => other === spot || apart(spot, other) > 0.75 * side)) roomy.add(spot);
     }
     return roomy;
   }
@@ -132,10 +137,10 @@ export class MapPicture {
       this.dot(context, spot);
       return;
     }
-    const scale = PICTURE / Math.max(image.naturalWidth, image.naturalHeight);
+    const scale = this.side / Math.max(image.naturalWidth, image.naturalHeight);
     const [width, height] = [image.naturalWidth * scale, image.naturalHeight * scale];
     context.drawImage(image, spot.px - width / 2, spot.py - height / 2, width, height);
-    if (this.n_labels) this.dot(context, { ...spot, py: spot.py + PICTURE / 2 + 2 });
+    if (this.n_labels) this.dot(context, { ...spot, py: spot.py + this.side / 2 + 2 });
   }
 
   /** The picture of a point once it is there; a redraw follows when it comes. */

@@ -5,10 +5,10 @@ const FARTHEST = 0.6;
 const STEP = 1.5;
 const CLICK_REACH = 5;
 
-/** A view of the square [-1, 1]²: its centre and magnification. */
+/** A view of points that reach as far as `extent` from 0: its centre and magnification. */
 export class MapView {
-  constructor(canvas, { onMove, onHover, onPick }) {
-    Object.assign(this, { canvas, onMove, onHover, onPick });
+  constructor(canvas, extent, { onMove, onHover, onPick }) {
+    Object.assign(this, { canvas, extent, onMove, onHover, onPick });
     this.centre = [0, 0];
     this.zoom = 1;
     this.pointers = new Map();
@@ -18,7 +18,8 @@ export class MapView {
   /** Pixels of a unit. */
   get scale() {
     const { clientWidth, clientHeight } = this.canvas;
-    return 0.46 * this.zoom * Math.min(clientWidth, clientHeight);
+    const [width, height] = this.extent.map((half) => 2 * Math.max(half, 1e-3));
+    return 0.86 * this.zoom * Math.min(clientWidth / width, clientHeight / height);
   }
 
   toScreen(x, y) {
@@ -76,7 +77,10 @@ export class MapView {
     canvas.addEventListener("pointermove", (event) => this.drag(event));
     canvas.addEventListener("pointerup", (event) => this.release(event));
     canvas.addEventListener("pointercancel", (event) => this.pointers.delete(event.pointerId));
-    canvas.addEventListener("pointerleave", (event) => this.pointers.size || this.onHover(null, event.relatedTarget));
+    canvas.addEventListener("pointerleave", (event) => {
+      // A finger leaves when it is lifted; what it pointed at stays told.
+      if (!this.pointers.size && event.pointerType !== "touch") this.onHover(null, event.relatedTarget);
+    });
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
