@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -82,10 +83,11 @@ def plan(
     >>> made.n_unchanged, made.n_updated
     (1, 1)
     """
-    places: dict[str, dict[Path, str]] = defaultdict(dict)
+    working = str(Path.cwd())
+    places: dict[str, dict[str, str]] = defaultdict(dict)
     for row in existing:
-        places[row.hash] |= {place(path): path for path in row.paths}
-    holds: dict[Path, list[str]] = defaultdict(list)
+        places[row.hash] |= {_place(path, working): path for path in row.paths}
+    holds: dict[str, list[str]] = defaultdict(list)
     for content, known in places.items():
         for where in known:
             holds[where].append(content)
@@ -93,11 +95,11 @@ def plan(
     encode: dict[str, list[Source]] = defaultdict(list)
     gained: dict[str, list[str]] = defaultdict(list)
     lost: dict[str, dict[str, None]] = defaultdict(dict)
-    seen: dict[Path, None] = {}
+    seen: set[str] = set()
     unchanged = updated = 0
     for source, content in sources:
         path, is_file = source_path(source), not isinstance(source, Shape)
-        where = place(path)
+        where = _place(path, working)
         if is_file and where in seen:
             continue
         others = [old for old in holds.get(where, ()) if old != content] if is_file else []
@@ -105,7 +107,7 @@ def plan(
             lost[old][places[old][where]] = None
         updated += bool(others)
         if is_file:
-            seen[where] = None
+            seen.add(where)
         if content not in places:
             encode[content].append(source)
         elif where in places[content]:
@@ -125,26 +127,32 @@ def place(path: str) -> Path:
     >>> place("shapes/../hand.png") == place("hand.png")
     True
     """
-    file = Path(path)
-    return _resolved(str(file.parent), str(Path.cwd())) / file.name
+    return Path(_place(path, str(Path.cwd())))
+
+
+def _place(path: str, working: str) -> str:
+    """Return where a file lies as text, which is quicker for many of them."""
+    folder, name = os.path.split(path)
+    return os.path.join(_resolved(folder, working), name)  # noqa: PTH118
 
 
 @cache
-def _resolved(folder: str, _working: str) -> Path:
+def _resolved(folder: str, working: str) -> str:
     """Resolve a folder once; what it means depends on the working directory."""
-    return Path(folder).resolve()
+    return os.path.realpath(os.path.join(working, folder))  # noqa: PTH118
 
 
 def _gone(
-    places: Mapping[str, Mapping[Path, str]], seen: Iterable[Path], prune: Iterable[str | Path]
+    places: Mapping[str, Mapping[str, str]], seen: set[str], prune: Iterable[str | Path]
 ) -> Iterable[tuple[str, str]]:
     """Yield the content and path of files below these folders that are no longer there."""
-    roots, kept = [Path(path).resolve() for path in prune], set(seen)
+    roots = [Path(path).resolve() for path in prune]
     for content, known in places.items() if roots else ():
         for where, path in known.items():
+            file = Path(where)
             # a shape that was no file has its name for a path
-            below = has_suffix(where, SUFFIXES) and any(where.is_relative_to(root) for root in roots)
-            if below and where not in kept and not where.exists():
+            below = has_suffix(file, SUFFIXES) and any(file.is_relative_to(root) for root in roots)
+            if below and where not in seen and not file.exists():
                 yield content, path
 
 
