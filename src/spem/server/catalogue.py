@@ -115,9 +115,14 @@ class Catalogue:
 
     def held(self, digest: str) -> Snapshot | None:
         """Return all that lists and searches need, in memory; None where it is too much for that."""
-        snapshot = self._snapshots.get(digest, lambda: self.index.snapshots.of(self.index.store, digest))
+        snapshot = self._snapshots.get(digest, lambda: self._snapshot(digest))
         fits = snapshot is not None and snapshot.rows is not None and len(snapshot.ids) <= EXACT_ROWS
         return snapshot if fits else None
+
+    def _snapshot(self, digest: str) -> Snapshot | None:
+        """Return the codes of a model as they are in the database now."""
+        known = self.index.snapshots
+        return known.of(known.pinned(self.index.store, digest), digest)
 
     def page(
         self, digest: str, filters: Filters, sort: Sort, offset: int, limit: int
@@ -130,7 +135,7 @@ class Catalogue:
             return total, store.rows(
                 digest, where, limit=limit, offset=offset, sort=sort, descending=descending
             )
-        key = (digest, held.version, where, sort)
+        key = (digest, held.pinned.version, where, sort)
         order = self._orders.get(key, lambda: _order(held, where, sort))
         return len(order), [to_row(record) for record in held.records(order[offset : offset + limit])]
 
