@@ -105,7 +105,7 @@ def test_annotate_writes_only_what_changes(filled: Index, tiny_model: Model) -> 
     """Rows that have the label already are left alone, others told as changed, codes and all kept."""
     ids = [row.id for row in filled.rows()]
     before = filled.get(ids[0])
-    assert annotate(filled.store, tiny_model.digest, lambda row: replace(row, label="cats"), ids) == 3
+    assert annotate(filled.store, tiny_model.digest, lambda row: replace(row, label="cats"), ids=ids) == 3
     assert filled.count("label = 'cats'") == 4
     after = filled.get(ids[0])
     assert np.array_equal(after.code, before.code)

@@ -62,15 +62,18 @@ class Records:
         ModelError
             When the index has no such model, or several and none is named.
         """
+        made = model.model if isinstance(model, Codes) else model
+        given = made.digest if isinstance(made, Model) else made
+        if given is not None and self.store.is_open(given):
+            return given
         known = self.store.digests()
-        if model is None:
+        if given is None:
             if len(known) == 1:
                 return known[0]
             msg = f"{self.store.address}: {len(known)} models ({', '.join(known)}); name one of them"
             if not known:
                 msg = f"{self.store.address}: an index without a shape; add some first"
             raise ModelError(msg)
-        given = model if isinstance(model, str) else _model_of(model).digest
         if given not in known:
             has = ", ".join(known) or "none"
             msg = f"model {given} is none of {self.store.address}, which has {has}; make both with one model"
@@ -183,11 +186,11 @@ class Records:
         """
         digest = self.digest(model)
         chosen = [ids] if isinstance(ids, str) else ids
-        if chosen is None:
-            chosen = [row.id for row in self.store.rows(digest, where)]
-        return updates.annotate(
-            self.store, digest, lambda row: annotated(row, label, metadata or {}), list(chosen)
-        )
+        if chosen is not None and where is not None:
+            msg = "annotate takes ids or a filter (where=...); give one of them, or neither for all"
+            raise ParameterError(msg)
+        changed = partial(annotated, label=label, metadata=metadata or {})
+        return updates.annotate(self.store, digest, changed, ids=chosen, where=where)
 
     def label(
         self, labels: str | Path | Mapping[str, str], *, model: str | None = None
@@ -204,8 +207,7 @@ class Records:
         digest = self.digest(model)
         table = labels if isinstance(labels, Mapping) else read_labels(labels)
         given, unused = labels_of(self.store.rows(digest), table)
-        relabel = partial(_relabelled, given)
-        return updates.annotate(self.store, digest, relabel, list(given)), unused
+        return updates.annotate(self.store, digest, partial(_relabelled, given)), unused
 
     def codes(self, where: str | None = None, *, model: str | None = None) -> Codes:
         """Return the codes of rows, centred and of unit length, in order of name."""
@@ -244,11 +246,6 @@ class Records:
         return sum(self.store.count(digest) for digest in self.store.digests())
 
 
-def _model_of(made: Model | Codes) -> Model:
-    """Return the model of codes, or a model as it is."""
-    return made.model if isinstance(made, Codes) else made
-
-
 def _relabelled(labels: Mapping[str, str], row: Row) -> Row:
-    """Return a row with its label of a table by id."""
-    return replace(row, label=labels[row.id])
+    """Return a row with its label of a table by id, where it has one."""
+    return replace(row, label=labels.get(row.id, row.label))

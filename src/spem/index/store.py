@@ -121,6 +121,10 @@ class Store:
         names = [name for name in self._names() if name.startswith(_CODES) and self._is_whole(name)]
         return tuple(name.removeprefix(_CODES) for name in names)
 
+    def is_open(self, digest: str) -> bool:
+        """Tell whether the table of a model has been opened, so that it is known to be there."""
+        return _CODES + digest in self._tables
+
     def save_model(self, model: Model) -> None:
         """Write a model and make its table, unless they are there."""
         name = _CODES + model.digest

@@ -127,18 +127,31 @@ def remove_where(store: Store, digest: str, where: str) -> int:
     return count
 
 
-def annotate(store: Store, digest: str, change: Callable[[Row], Row], ids: Sequence[str]) -> int:
-    """Change the labels and metadata of rows and return how many differ then."""
+def annotate(
+    store: Store,
+    digest: str,
+    change: Callable[[Row], Row],
+    ids: Sequence[str] | None = None,
+    *,
+    where: str | None = None,
+) -> int:
+    """Change the labels and metadata of rows, by ids or those that a filter lets through, or of all.
+
+    Returns
+    -------
+    int
+        Number of rows that differ then.
+    """
+    filters = [where] if ids is None else [any_of("id", some) for some in _batches(list(dict.fromkeys(ids)))]
     changed = 0
-    for some in _batches(list(dict.fromkeys(ids))):
+    for each in filters:
         with store.writing():
-            before = _read(store, store.table(digest), some)
-            after = {key: change(row) for key, row in before.items()}
-            records = [
-                {"id": key, "label": row.label, "metadata": sorted(row.metadata.items())}
-                for key, row in after.items()
-                if (row.label, dict(row.metadata)) != (before[key].label, dict(before[key].metadata))
-            ]
+            records = []
+            for row in store.rows(digest, each):
+                new = change(row)
+                if (new.label, dict(new.metadata)) != (row.label, dict(row.metadata)):
+                    given = {"id": row.id, "label": new.label, "metadata": sorted(new.metadata.items())}
+                    records.append(given)
             _update(store, digest, records, ("id", "label", "metadata"))
             changed += len(records)
     return changed
