@@ -141,6 +141,7 @@ def test_queries_by_file_and_shape(tmp_path: Path) -> None:
     by_code = index.search(encode_file(shape, index.model()), 2)
     assert _ids(by_file) == _ids(by_shape) == _ids(by_code)
     assert by_file[0].distance == pytest.approx(by_code[0].distance, abs=1e-6)
+    assert len(index.search(shape, volume_within=1.1)) == 1
     np.save(tmp_path / "two.npy", np.pad(np.array([[1, 1, 0, 2, 2]]).repeat(3, 0), 1))
     with pytest.raises(ShapeError, match="holds 2 labels; add the file"):
         index.search(tmp_path / "two.npy")

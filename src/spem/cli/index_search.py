@@ -82,7 +82,7 @@ def duplicates(
     db: Address,
     distance: Annotated[
         float | None,
-        typer.Option(help="Correlation distance under which shapes are near-duplicates. [0.01]"),
+        typer.Option(help="Correlation distance under which shapes are near-duplicates. [0.05]"),
     ] = None,
     where: Where = None,
     model: ModelName = None,
@@ -96,7 +96,7 @@ def duplicates(
     \b
     Examples:
       spem index duplicates shapes.db
-      spem index duplicates shapes.db --distance 0.02 --json
+      spem index duplicates shapes.db --distance 0.1 --json
     """  # noqa: D301
     from spem.index.duplicates import DISTANCE
 

@@ -22,7 +22,7 @@ from spem.index.executors import LocalExecutor
 from spem.index.optimizing import Optimized, optimize
 from spem.index.records import Records
 from spem.index.searching import Search, search
-from spem.index.snapshot import Snapshots
+from spem.index.snapshot import DEFAULT_MEMORY, Snapshots
 from spem.index.store import Store
 from spem.retrieval.labels import read_labels
 from spem.shapes.shape import Shape
@@ -56,7 +56,12 @@ class Index(Records):
 
     @classmethod
     def open(
-        cls, address: str | Path, *, create: bool = True, storage_options: Mapping[str, str] | None = None
+        cls,
+        address: str | Path,
+        *,
+        create: bool = True,
+        memory: int = DEFAULT_MEMORY,
+        storage_options: Mapping[str, str] | None = None,
     ) -> Self:
         """Open an index, or make one where there is none.
 
@@ -66,6 +71,9 @@ class Index(Records):
             Folder, or address on object storage such as ``s3://bucket/shapes``.
         create
             Whether an index is made where there is none.
+        memory
+            Bytes of codes that search keeps in memory, 1 GiB by default; the database compares them where
+            there are more.
         storage_options
             Options of object storage, as LanceDB takes them.
 
@@ -74,7 +82,8 @@ class Index(Records):
         ReadError
             When there is none.
         """
-        return cls(Store.open(address, create=create, storage_options=storage_options))
+        store = Store.open(address, create=create, storage_options=storage_options)
+        return cls(store, Snapshots(memory))
 
     def add(
         self,

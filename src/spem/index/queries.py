@@ -109,7 +109,7 @@ def _encoded(source: Source, model: Model) -> Query:
     model.require_ndim(shape.ndim, shape.name)
     with threadpool_limits(1):
         code = model.encode(shape_features(shape, model.settings), shape.name)
-    return Query(standardised_codes(code[None])[0], shape.volume)
+    return Query(standardised_codes(code[None])[0], float(shape.volume))
 
 
 def _row(key: str, table: Any, snapshot: Snapshot | None) -> Query | None:
