@@ -1,4 +1,4 @@
-"""The page of one shape in a browser: pictures, slider, points, sources, parts, files, two beside each other."""
+"""The page of one shape in a browser: pictures, slider, points, sources, parts, files, comparison."""
 
 from __future__ import annotations
 
@@ -217,7 +217,7 @@ def test_files_of_what_is_shown_arrive_and_are_sound(open_shape, flat, solid, tm
 
 
 def test_solid_turns_and_is_cut(open_shape, solid):
-    """A solid is turned by keys and buttons, picked by a key, cut by sliders, and recoloured within 100 ms."""
+    """A solid is turned by keys and buttons, picked by a key, cut and recoloured within 100 ms."""
     page = open_shape(solid)
     assert page.locator(".shape-slice").count() == 3
     assert _quickly(page)

@@ -7,7 +7,7 @@ import { element } from "./dom.js";
 import { href } from "./router.js";
 import { Bar } from "./shape_bar.js";
 import { colourMap, Colouring, shown } from "./shape_colouring.js";
-import { loadShape } from "./shape_data.js";
+import { loadCard, loadPictures } from "./shape_data.js";
 import { facts } from "./shape_details.js";
 import { Stage } from "./shape_stage.js";
 
@@ -18,8 +18,8 @@ const NONE = { header: { words: [] }, arrays: {} };
 
 /** Fill an element with the comparison of two shapes. */
 export async function compareShapes(root, queryId, answerId) {
-  const [query, answer] = await Promise.all([loadShape(queryId), loadShape(answerId)]);
-  const comparison = new Comparison([queryId, answerId], [query, answer]);
+  const load = async (id) => ({ card: await loadCard(id), ...(await loadPictures(id)) });
+  const comparison = new Comparison([queryId, answerId], await Promise.all([load(queryId), load(answerId)]));
   root.replaceChildren(comparison.root);
   root.closest("dialog")?.addEventListener("close", () => comparison.destroy(), { once: true });
   comparison.paint();
@@ -98,9 +98,11 @@ class Comparison {
     }
     const { correlation, n_words: count } = words.header;
     const total = found.reduce((sum, { share }) => sum + share, 0);
-    const note = `Visual words are what codes are made of: typical surroundings of a point. Of ${count} words these ${found.length} bring most to the correlation of the two codes: ${shown(total, 2)} of ${shown(correlation, 2)}. The points that say so are marked on both.`;
+    const alike = correlation > 0;
+    const brought = alike ? `: ${shown(total, 2)} of ${shown(correlation, 2)}` : `, ${shown(total, 2)}, though all words together come to ${shown(correlation, 2)}`;
+    const note = `Visual words are what codes are made of: typical surroundings of a point. Of ${count} words these ${found.length} bring most to the correlation of the two codes${brought}. The points that say so are marked on both.`;
     this.list = element("ol", { class: "shape-legend words" });
-    this.why.replaceChildren(element("h3", {}, "Why they are alike"), element("p", { class: "shape-note" }, note), this.list);
+    this.why.replaceChildren(element("h3", {}, alike ? "Why they are alike" : "What they share"), element("p", { class: "shape-note" }, note), this.list);
     this.mark(null);
   }
 

@@ -7,7 +7,7 @@ import { shown } from "./shape_colouring.js";
 /** Steps of the slider between two sampled rho. */
 const FINE = 0.02;
 const MOST_PARTS = 12;
-export const SHOWN = { field: "Field", map: "Map", part: "Parts", source: "Source" };
+export const SHOWN = { field: "Field", map: "Map", parts: "Parts", source: "Source" };
 
 function choices(name, legend, entries, onChoice, kind) {
   const inputs = {};
@@ -24,7 +24,7 @@ export class Controls {
   constructor({ fields, nSources, solid }, { onRho, onChange }) {
     Object.assign(this, { fields, nSources, solid, onRho, onChange });
     this.show = choices("show", "Colour by", Object.entries(SHOWN), (show) => onChange({ show }), "segments");
-    this.panels = { field: this.fieldPanel(), map: this.mapPanel(), part: this.partPanel(), source: this.sourcePanel() };
+    this.panels = { field: this.fieldPanel(), map: this.mapPanel(), parts: this.partPanel(), source: this.sourcePanel() };
     this.root = element("section", { class: "shape-card shape-controls", "aria-label": "Colours" }, this.show.root, ...Object.values(this.panels));
   }
 
@@ -79,7 +79,7 @@ export class Controls {
     this.k = element("select", { id: "shape-k", onchange: () => this.onChange({ k: this.k.value || null, part: null }) },
       element("option", { value: "" }, "chosen by the shape"), ...options);
     this.legend = element("ul", { class: "shape-legend" });
-    this.strength = element("input", { type: "checkbox", onchange: () => this.onChange({ show: this.strength.checked ? "strength" : "part" }) });
+    this.strength = element("input", { type: "checkbox", onchange: () => this.onChange({ show: this.strength.checked ? "strength" : "parts" }) });
     this.partNote = element("p", { class: "shape-note" });
     return element(
       "div",
@@ -116,7 +116,7 @@ export class Controls {
 
   /** Show what is chosen. */
   update(view) {
-    const kind = view.show === "strength" ? "part" : view.show;
+    const kind = view.show === "strength" ? "parts" : view.show;
     this.show.choose(kind);
     for (const [name, panel] of Object.entries(this.panels)) panel.hidden = name !== kind;
     this.fit.checked = view.fit;
@@ -145,7 +145,7 @@ export class Controls {
         type: "button",
         "aria-pressed": String(picked === part),
         "aria-label": `Part ${part + 1}, ${shown(100 * values[part])} % of the shape`,
-        onclick: () => this.onChange(picked === part ? { part: null, show: "part" } : { part: String(part + 1) }),
+        onclick: () => this.onChange(picked === part ? { part: null, show: "parts" } : { part: String(part + 1) }),
       }, this.swatch(partColour(part)), element("span", {}, `Part ${part + 1}`), element("span", { class: "share" }, `${shown(100 * values[part])} %`));
     // Focus stays where it was, as the list is made anew.
     const focused = [...this.legend.querySelectorAll("button")].indexOf(document.activeElement);

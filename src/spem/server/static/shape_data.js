@@ -176,22 +176,21 @@ export function path(id, what = "") {
   return `api/shapes/${encodeURIComponent(id)}${what && `/${what}`}`;
 }
 
-/** Everything of a shape that its pictures need. */
-export async function loadShape(id, signal) {
-  const [card, geometry, fields] = await Promise.all([
-    json(path(id), {}, signal),
-    bytes(path(id, "geometry"), {}, signal),
-    bytes(path(id, "field"), {}, signal),
-  ]);
-  return { card, geometry: new Geometry(unpackArrays(geometry)), fields: new Fields(unpackArrays(fields)) };
+/** What is known of a shape. */
+export const loadCard = (id) => json(path(id));
+
+/** What the pictures of a shape need. */
+export async function loadPictures(id) {
+  const [geometry, fields] = await Promise.all([bytes(path(id, "geometry")), bytes(path(id, "field"))]);
+  return { geometry: new Geometry(unpackArrays(geometry)), fields: new Fields(unpackArrays(fields)) };
 }
 
 /** Parts of a shape; `k` of them, or as many as the server chooses. */
-export async function loadParts(id, k, signal) {
-  return unpackArrays(await bytes(path(id, "parts"), { k }, signal));
+export async function loadParts(id, k) {
+  return unpackArrays(await bytes(path(id, "parts"), { k }));
 }
 
 /** Log field of one source. */
-export async function loadSource(id, patch, signal) {
-  return unpackArrays(await bytes(path(id, `source/${patch}`), {}, signal));
+export async function loadSource(id, patch) {
+  return unpackArrays(await bytes(path(id, `source/${patch}`)));
 }

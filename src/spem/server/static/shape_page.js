@@ -6,8 +6,8 @@ import { Beside } from "./shape_beside.js";
 import { colourField, colourMap, colourParts, colourSource, colourStrength, Colouring, shown } from "./shape_colouring.js";
 import { Controls } from "./shape_controls.js";
 import { onTheme } from "./colours.js";
-import { loadParts, loadShape, loadSource } from "./shape_data.js";
-import { downloads, facts, report, similar } from "./shape_details.js";
+import { loadCard, loadParts, loadPictures, loadSource } from "./shape_data.js";
+import { below, downloads, facts, withoutPictures } from "./shape_details.js";
 import { DEPTH } from "./shape_gl.js";
 import { Profile } from "./shape_profile.js";
 import { Stage } from "./shape_stage.js";
@@ -16,12 +16,25 @@ import { readView, writtenRho } from "./shape_state.js";
 /** Draw the page of a shape; the address says what is looked at. */
 export async function renderShape(root, id, state, setState) {
   document.title = "Shape · spem";
-  root.replaceChildren(element("p", { class: "shape-note", role: "status" }, "Solving for the fields of the shape…"));
-  const page = new ShapePage(id, await loadShape(id), setState);
-  document.title = `${page.card.name} · spem`;
+  const wait = element("p", { class: "shape-note", role: "status" }, "Solving for the fields of the shape…");
+  root.replaceChildren(wait);
+  const pictures = loadPictures(id).catch((error) => ({ error }));
+  const card = await loadCard(id);
+  document.title = `${card.name} · spem`;
+  root.replaceChildren(element("article", { class: "shape" }, head(card), wait));
+  const { error, ...drawn } = await pictures;
+  if (error) {
+    wait.replaceWith(withoutPictures(id, card, error.message));
+    return { update() {} };
+  }
+  const page = new ShapePage(id, { card, ...drawn }, setState);
   root.replaceChildren(page.root);
   page.update(state);
   return page;
+}
+
+function head(card) {
+  return element("header", { class: "shape-head" }, element("h1", {}, card.name), element("p", {}, facts(card)));
 }
 
 class ShapePage {
@@ -60,13 +73,10 @@ class ShapePage {
     return element(
       "article",
       { class: "shape" },
-      element("header", { class: "shape-head" }, element("h1", {}, this.card.name), element("p", {}, facts(this.card))),
+      head(this.card),
       element("div", { class: "shape-main" }, this.controls.root, this.figure, point),
       this.beside.root,
-      element("section", {}, heading("Similar shapes"), ...similar(this.id)),
-      element("div", { class: "shape-more" },
-        element("section", {}, heading("About this shape"), report(this.card, this.geometry)),
-        element("section", {}, heading("Downloads"), this.files)),
+      ...below(this.id, this.card, this.geometry, this.files),
     );
   }
 
@@ -200,7 +210,8 @@ class ShapePage {
     this.bar.show(this.colouring);
     this.hover(-1);
     const solid = this.geometry.ndim === 3;
-    this.caption.textContent = solid ? `The surface has the values ${DEPTH} voxels below it, as on it the field is 1 by definition.` : "";
+    const why = ["field", "map"].includes(this.view.show) ? ", as on it the field is 1 by definition" : "";
+    this.caption.textContent = solid ? `The surface has the values ${DEPTH} voxels below it${why}.` : "";
     const { title, low, high, labels } = this.colouring;
     const range = labels ? labels.map(({ label, size }) => `part ${label + 1} ${shown(100 * size)} %`).join(", ") : `from ${shown(low)} to ${shown(high)}`;
     this.stage.describe(`${solid ? "Surface" : "Picture"} of ${this.card.name}. ${title}, ${range}. Arrow keys ${solid ? "turn it" : "choose a point"}.`);

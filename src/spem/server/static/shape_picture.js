@@ -1,7 +1,7 @@
 /** The picture of a silhouette: crisp pixels cut along the contour, a cursor, marks and a source. */
 
 import { element } from "./dom.js";
-import { dot, fitCanvas, pageColour, Raster, ring } from "./shape_raster.js";
+import { dot, dotSize, fitCanvas, pageColour, Raster, ring } from "./shape_raster.js";
 
 const MARGIN = 14;
 /** How near the contour a click means it, in CSS pixels. */
@@ -162,7 +162,7 @@ export class Picture {
     }
     for (const { points, colour } of this.marks) {
       for (let i = 0; i + 1 < points.length; i += 2) {
-        dot(context, points[i + 1] * right + left, points[i] * down + top, 5, colour);
+        dot(context, points[i + 1] * right + left, points[i] * down + top, dotSize(this.canvas) / 2, colour);
       }
     }
     if (this.node !== null) {

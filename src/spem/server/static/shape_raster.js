@@ -58,6 +58,11 @@ export function ring(context, x, y, radius, colour) {
   }
 }
 
+/** Size of marks that suits a canvas, in CSS pixels. */
+export function dotSize({ clientWidth }) {
+  return Math.min(Math.max(clientWidth / 36, 6), 12);
+}
+
 /** Draw a filled point with a rim. */
 export function dot(context, x, y, radius, colour) {
   context.beginPath();

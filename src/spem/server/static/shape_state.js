@@ -8,13 +8,13 @@ function whole(text, low, high) {
 
 /** What is looked at; what the address does not say, or says wrongly, is as it is at first. */
 export function readView(state, { geometry, fields, nSources }) {
-  const kinds = ["field", "map", "part", "strength", "source"];
+  const kinds = ["field", "map", "parts", "strength", "source"];
   const rho = Number(state.rho);
   const part = whole(state.part, 1, 20);
   const places = (state.slice ?? "").split(",").map((text, axis) => whole(text, 0, (geometry.grid[axis] ?? 1) - 1));
   const show = kinds.includes(state.show) ? state.show : "field";
   return {
-    show: show === "strength" && part === null ? "part" : show,
+    show: show === "strength" && part === null ? "parts" : show,
     place: rho > 0 ? fields.placeOf(rho) : firstPlace(fields),
     fit: state.fit === undefined ? geometry.ndim === 3 : state.fit === "1",
     map: (whole(state.map, 1, fields.nMaps) ?? 1) - 1,

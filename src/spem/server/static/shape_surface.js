@@ -4,7 +4,7 @@ import { element } from "./dom.js";
 import { isDark, shares } from "./colours.js";
 import { extents, faceUnder, principalView, times, turn, vertexNormals } from "./shape_camera.js";
 import { Graphics } from "./shape_gl.js";
-import { fitCanvas } from "./shape_raster.js";
+import { dotSize, fitCanvas } from "./shape_raster.js";
 
 const STEP = Math.PI / 12;
 const ZOOM = 1.25;
@@ -201,7 +201,7 @@ export class Surface {
     return {
       place: Float32Array.from(all.flatMap(({ points }) => Array.from(points))),
       paint: Float32Array.from(all.flatMap(({ points, colour }) => Array.from(points, (_, i) => shares(colour)[i % 3]))),
-      size: (13 * this.canvas.width) / Math.max(this.canvas.clientWidth, 1),
+      size: (dotSize(this.canvas) * this.canvas.width) / Math.max(this.canvas.clientWidth, 1),
     };
   }
 
