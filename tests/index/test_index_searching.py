@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,11 @@ from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.errors import ModelError, ParameterError, ReadError, ShapeError
 from spem.index.index import Index
+from spem.index.pinned import Pinned
 from spem.index.row import Row
 from spem.index.schema import LIGHT
 from spem.index.snapshot import Snapshots
+from spem.index.store import Store
 from spem.index.updates import write
 from spem.retrieval.distances import correlation_distance
 from spem.shapes.shape import Shape
@@ -179,3 +182,21 @@ def test_an_empty_index_has_no_answers(tmp_path: Path, tiny_model: Model) -> Non
     index = Index.open(tmp_path / "db")
     index.store.save_model(tiny_model)
     assert len(index.search(np.arange(64.0))) == 0
+
+
+def test_a_version_that_is_cleaned_up_meanwhile(
+    crowd: Index, tiny_model: Model, ready_row: Callable[..., Row], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A search whose version of the table is deleted while it goes on is made again."""
+    index = replace(crowd, snapshots=Snapshots(0))
+    crowd.search("shape 7")
+    old = index.snapshots.pinned(index.store, index.digest())
+    write(index.store, tiny_model.digest, [ready_row("new")])
+    index.optimize(older_than=timedelta(0))
+    kept, once = index.snapshots.pinned, [old]
+
+    def pinned(store: Store, digest: str) -> Pinned:
+        return once.pop() if once else kept(store, digest)
+
+    monkeypatch.setattr(index.snapshots, "pinned", pinned)
+    assert index.search("new", 1)[0].row.name == "new"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.codes.arguments import finite_number, whole_number
-from spem.errors import ParameterError
+from spem.errors import ParameterError, SpemError
 from spem.index.answers import Answers, Found
 from spem.index.approximate import Approximation, exhaustive
 from spem.index.comparison import in_database, in_memory
@@ -103,8 +103,27 @@ def search(
     SpemError
         When the query or the filter has no meaning, or the index cannot be read.
     """
+    pinned = snapshots.pinned(store, digest)
+    try:
+        return _search(store, snapshots, digest, query, wanted, pinned)
+    except SpemError:
+        newer = snapshots.pinned(store, digest)
+        # what was being read may have been cleaned up meanwhile
+        if newer is pinned:
+            raise
+        return _search(store, snapshots, digest, query, wanted, newer)
+
+
+def _search(
+    store: Store,
+    snapshots: Snapshots,
+    digest: str,
+    query: str | Path | Shape | NDArray[Any],
+    wanted: Search,
+    pinned: Pinned,
+) -> Answers:
+    """Search one version of a table."""
     with told(store.address, where=wanted.where):
-        pinned = snapshots.pinned(store, digest)
         way = _approximation(pinned, wanted.exact, store.address)
         snapshot = None if way else snapshots.of(pinned, digest)
         found = resolve(query, store, digest, pinned, snapshot)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spem.index.database_errors import told
 from spem.index.extra import require
 from spem.index.pinned import Pinned
 from spem.index.schema import LIGHT
@@ -111,10 +112,11 @@ class Snapshots:
 
     def pinned(self, store: Store, digest: str) -> Pinned:
         """Return the table of a model as it is in the database now."""
-        held = self._pinned.get(digest)
-        if held is None or held.version != store.table(digest).version:
-            held = self._pinned[digest] = Pinned.newest(store, digest)
-        return held
+        with told(store.address):
+            held = self._pinned.get(digest)
+            if held is None or held.version != store.table(digest).version:
+                held = self._pinned[digest] = Pinned.newest(store, digest)
+            return held
 
     def of(self, pinned: Pinned, digest: str) -> Snapshot | None:
         """Return the codes of a table, or None where they are too many.
