@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from spem.index.answers import Answers, Found
-from spem.index.comparison import in_memory
-from spem.index.extra import require
 from spem.index.index import Index
 from spem.index.row import Row
-from spem.index.schema import LIGHT, standardised_codes, to_row
+from spem.index.schema import LIGHT, standardised_codes
 from spem.index.searching import EXACT_ROWS
-from spem.index.snapshot import Snapshot
-from spem.server.cards import card, ranking
+from spem.server.cards import card, ranking, to_json
+from spem.server.holding import DESCENDING, Holding
 from spem.server.queries import Filters, Sort, is_digest, is_id, quoted
 from spem.server.refusals import Refusal
 from spem.server.remembered import Remembered
@@ -26,7 +22,6 @@ from spem.server.remembered import Remembered
 FRESH = 2.0
 # Seconds after which lists and searches see what another process has written.
 _SEEN = 0.5
-_DESCENDING = ("added", "volume")
 _THUMBNAILS = 4096
 _PAGES = 32
 
@@ -62,7 +57,8 @@ class Catalogue:
     def __init__(self, index: Index) -> None:
         self.index = index
         self._fresh = Remembered(64, FRESH)
-        self._snapshots = Remembered(8, _SEEN)
+        self._seen = Remembered(8, _SEEN)
+        self._holdings: dict[str, Holding] = {}
         self._orders = Remembered(_PAGES, FRESH)
         self._thumbnails = Remembered(_THUMBNAILS, 60.0)
         self._described: dict[str, tuple[str, int | None, int]] = {}
@@ -106,40 +102,36 @@ class Catalogue:
     def _labels(self, digest: str) -> list[dict[str, Any]]:
         """Count the labels."""
         held = self.held(digest)
-        rows: Any = (
-            held.rows if held else self.index.store.table(digest).search().select(["label"]).to_arrow()
-        )
-        column = rows["label"]
+        column = held.labels if held else self.index.store.query(digest).select(["label"]).to_arrow()["label"]
         counts = {entry["values"]: entry["counts"] for entry in column.value_counts().to_pylist()}
         return [{"label": label, "n": counts[label]} for label in sorted(counts) if label]
 
-    def held(self, digest: str) -> Snapshot | None:
+    def held(self, digest: str) -> Holding | None:
         """Return all that lists and searches need, in memory; None where it is too much for that."""
-        snapshot = self._snapshots.get(digest, lambda: self._snapshot(digest))
-        fits = snapshot is not None and snapshot.rows is not None and len(snapshot.ids) <= EXACT_ROWS
-        return snapshot if fits else None
+        return self._seen.get(digest, lambda: self._held(digest))
 
-    def _snapshot(self, digest: str) -> Snapshot | None:
-        """Return the codes of a model as they are in the database now."""
+    def _held(self, digest: str) -> Holding | None:
+        """Return what was held before, or anew where the database has changed."""
         known = self.index.snapshots
-        return known.of(known.pinned(self.index.store, digest), digest)
+        snapshot = known.of(known.pinned(self.index.store, digest), digest)
+        if snapshot is None or snapshot.rows is None or len(snapshot.ids) > EXACT_ROWS:
+            return None
+        held = self._holdings.get(digest)
+        if held is None or held.snapshot is not snapshot:
+            held = self._holdings[digest] = Holding(snapshot, digest)
+        return held
 
-    def page(
-        self, digest: str, filters: Filters, sort: Sort, offset: int, limit: int
-    ) -> tuple[int, list[Row]]:
-        """Return how many shapes pass the filters, and a page of them."""
+    def page(self, digest: str, filters: Filters, sort: Sort, offset: int, limit: int) -> bytes:
+        """Return the JSON of how many shapes pass the filters, and of a page of them."""
         where, held = filters.where(), self.held(digest)
-        if held is None:
-            store, descending = self.index.store, sort in _DESCENDING
-            total = store.count(digest, where)
-            return total, store.rows(
-                digest, where, limit=limit, offset=offset, sort=sort, descending=descending
-            )
-        key = (digest, held.pinned.version, where, sort)
-        order = self._orders.get(key, lambda: _order(held, where, sort))
-        return len(order), [to_row(record) for record in held.records(order[offset : offset + limit])]
+        if held is not None:
+            key = (digest, held.snapshot.pinned.version, where, sort)
+            return held.page(self._orders.get(key, lambda: held.order(where, sort)), offset, limit)
+        store, descending = self.index.store, sort in DESCENDING
+        rows = store.rows(digest, where, limit=limit, offset=offset, sort=sort, descending=descending)
+        return to_json({"total": store.count(digest, where), "shapes": [card(row) for row in rows]})
 
-    def row(self, digest: str, key: str, columns: tuple[str, ...] = ()) -> Row:
+    def row(self, digest: str, key: str, *columns: str) -> Row:
         """Return one row, of the heavy columns those that are named.
 
         Raises
@@ -147,53 +139,43 @@ class Catalogue:
         Refusal
             When there is none.
         """
-        found: list[Row] = []
-        held = self.held(digest) if set(columns) <= {"vector"} else None
+        found = None
+        held = None if columns else self.held(digest)
         if held is not None:
-            places = held.positions([key]) if is_id(key) else np.empty(0, np.intp)
-            vectors = held.vectors[places]
-            records = held.records(places)
-            found = [
-                replace(to_row(record), code=code) for record, code in zip(records, vectors, strict=True)
-            ]
+            found = held.row(key) if is_id(key) else None
         elif is_id(key):
-            found = self.index.store.rows(digest, f"id = {quoted(key)}", columns=[*LIGHT, *columns], limit=1)
-        if not found:
+            wanted = [*LIGHT, *columns]
+            found = next(
+                iter(self.index.store.rows(digest, f"id = {quoted(key)}", columns=wanted, limit=1)), None
+            )
+        if found is None:
             raise Refusal(404, "no such shape; it may have been removed")
-        return found[0]
+        return found
 
     def thumbnail(self, digest: str, key: str) -> bytes:
         """Return the picture of a row; empty where its dimension has none."""
-        return self._thumbnails.get((digest, key), lambda: self.row(digest, key, ("thumbnail",)).thumbnail)
+        return self._thumbnails.get((digest, key), lambda: self.row(digest, key, "thumbnail").thumbnail)
 
-    def neighbours(
-        self, digest: str, query: Row, k: int, where: str | None, *, rerank: bool
-    ) -> dict[str, Any]:
-        """Return the shapes nearest to a row, of the index or of an upload."""
-        begin = time.perf_counter()
+    def neighbours(self, digest: str, key: str, k: int, where: str | None, *, rerank: bool) -> bytes:
+        """Return the JSON of the shapes nearest to one of the index."""
         held = None if rerank else self.held(digest)
-        if held is None:
-            answers = self.index.search(query.code, k, where=where, model=digest, rerank=rerank)
-        else:
-            near = in_memory(held, standardised_codes(query.code[None])[0], k, where)
-            rows = map(to_row, near.records(np.arange(len(near.distances))))
-            ranked = enumerate(zip(near.distances.tolist(), rows, strict=True), 1)
-            answers = Answers(
-                tuple(Found(rank, distance, row) for rank, (distance, row) in ranked), "exact", digest
-            )
-        return ranking(card(query), answers, time.perf_counter() - begin)
+        place = held.place(key) if held is not None and is_id(key) else None
+        if held is None or place is None:
+            return self.nearest(digest, self.row(digest, key, "vector"), k, where, rerank=rerank)
+        [query] = held.cards(np.array([place]))
+        return held.neighbours(query, held.snapshot.vectors[place], k, where)
+
+    def nearest(self, digest: str, query: Row, k: int, where: str | None, *, rerank: bool) -> bytes:
+        """Return the JSON of the shapes nearest to a row, which need not be of the index."""
+        held = None if rerank else self.held(digest)
+        if held is not None:
+            code = standardised_codes(query.code[None])[0]
+            return held.neighbours(to_json(card(query)), code, k, where)
+        begin = time.perf_counter()
+        answers = self.index.search(query.code, k, where=where, model=digest, rerank=rerank)
+        return to_json(ranking(card(query), answers, time.perf_counter() - begin))
 
     def changed(self) -> None:
         """Forget what a write has made old."""
-        for kept in (self._fresh, self._snapshots, self._orders, self._thumbnails):
+        for kept in (self._fresh, self._seen, self._orders, self._thumbnails):
             kept.clear()
-
-
-def _order(held: Snapshot, where: str | None, sort: Sort) -> NDArray[np.intp]:
-    """Return the places of the rows that pass a filter, in order; equal ones by id."""
-    places = np.arange(len(held.ids)) if where is None else held.matching(where)
-    rows: Any = held.rows
-    keys = rows.select([sort, "id"]).take(places)
-    direction = "descending" if sort in _DESCENDING else "ascending"
-    found = require("pyarrow.compute").sort_indices(keys, [(sort, direction), ("id", "ascending")])
-    return np.asarray(places[found.to_numpy()])

@@ -28,8 +28,9 @@ Documented = dict[int | str, dict[str, Any]]
 
 
 def json_reply(values: Any, status: int = 200) -> Response:
-    """Return plain values as JSON that is not kept."""
-    return Response(to_json(values), status, {"Cache-Control": "no-store"}, "application/json")
+    """Return plain values, or JSON that is written already, as JSON that is not kept."""
+    body = values if isinstance(values, bytes) else to_json(values)
+    return Response(body, status, {"Cache-Control": "no-store"}, "application/json")
 
 
 def kept_reply(request: Request, body: bytes, media_type: str, tag: str, seconds: int = 3600) -> Response:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Request
 from starlette.responses import Response
 
-from spem.server.cards import card, full_card
+from spem.server.cards import full_card
 from spem.server.queries import LONGEST_TEXT, Filters, Sort, parse_metadata
 from spem.server.refusals import Refusal
 from spem.server.replies import documented, documented_as, json_reply, kept_reply, tag_of
@@ -39,15 +39,11 @@ async def shapes(
 ) -> Response:
     """List the shapes that pass all filters: by name, the latest or the largest first."""
     filters = Filters(q, label or None, ndim, parse_metadata(metadata))
-    return json_reply(await live.reads.run(_page, live, model, filters, sort, offset, limit))
 
+    def find() -> bytes:
+        return live.catalogue.page(live.catalogue.digest(model), filters, sort, offset, limit)
 
-def _page(
-    live: Services, model: str | None, filters: Filters, sort: Sort, offset: int, limit: int
-) -> dict[str, Any]:
-    """Return a page of cards."""
-    total, rows = live.catalogue.page(live.catalogue.digest(model), filters, sort, offset, limit)
-    return {"total": total, "shapes": [card(row) for row in rows]}
+    return json_reply(await live.reads.run(find))
 
 
 @router.get("/{id}", summary="One shape, with its report", responses=documented(FullCard, 404))
@@ -84,9 +80,11 @@ async def neighbours(
     """Search by a shape of the index, or by an upload of the last hour; it finds itself first."""
     where = Filters("", label or None, ndim, parse_metadata(metadata)).where()
 
-    def find() -> dict[str, Any]:
-        digest, row = live.row(model, id, "vector")
-        return live.catalogue.neighbours(digest, row, k, where, rerank=rerank)
+    def find() -> bytes:
+        if not id.startswith(UPLOAD):
+            return live.catalogue.neighbours(live.catalogue.digest(model), id, k, where, rerank=rerank)
+        digest, row = live.row(model, id)
+        return live.catalogue.nearest(digest, row, k, where, rerank=rerank)
 
     return json_reply(await live.reads.run(find))
 

@@ -92,7 +92,7 @@ class Services:
         if key.startswith(UPLOAD):
             return self.submissions.found(self.jobs, key)
         digest = self.catalogue.digest(model)
-        return digest, self.catalogue.row(digest, key, columns)
+        return digest, self.catalogue.row(digest, key, *columns)
 
     def _readings(self) -> dict[str, tuple[str, float]]:
         """Return the figures of the moment."""
