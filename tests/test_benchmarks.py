@@ -14,6 +14,7 @@ import pytest
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 KEYS = {"benchmark", "quick", "machine", "facts", "tables", "targets", "skipped"}
 WITHOUT_DATA = (
+    "cluster",
     "convergence",
     "geodesics",
     "index_kill",
