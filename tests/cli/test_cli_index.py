@@ -81,6 +81,14 @@ def test_remove_takes_ids_paths_or_a_filter(spem: Command, refused: Callable[...
     refused(spem("index", "remove", db), "give the ids or paths of shapes, or --where")
 
 
+def test_remove_takes_a_model_with_its_shapes(spem: Command, refused: Callable[..., None], db: Path) -> None:
+    """All shapes go only where the model is named."""
+    refused(spem("index", "remove", db, "--all"), "--model with --all")
+    [model] = Index.open(db).models()
+    assert spem("index", "remove", db, "--model", model.digest, "--all").stdout == "removed 3 shapes\n"
+    assert Index.open(db).models() == ()
+
+
 def test_export_writes_what_evaluate_takes(spem: Command, refused: Callable[..., None], db: Path) -> None:
     """Tables, and codes that other commands read."""
     assert spem("index", "export", db, db.parent / "shapes.csv").stdout.endswith("shapes.csv: 3 shapes\n")

@@ -108,3 +108,15 @@ def test_remove_takes_ids_or_a_filter(filled: Index) -> None:
         filled.remove()
     assert filled.remove(filled.rows("name = 'cat'")[0].id) == 1
     assert filled.remove(where="label IS NOT NULL") == 3
+
+
+def test_drop_takes_a_model_with_its_rows(filled: Index, tiny_model: Model, other_model: Model) -> None:
+    """The other model stays, and the index needs no name again; the model may come back."""
+    filled.store.save_model(other_model)
+    assert filled.drop(tiny_model.digest) == 4
+    assert [model.digest for model in filled.models()] == [other_model.digest]
+    with pytest.raises(ModelError, match="is none of"):
+        filled.drop(tiny_model.digest)
+    filled.store.save_model(tiny_model)
+    assert filled.count(model=tiny_model.digest) == 0
+    assert filled.model(tiny_model.digest).digest == tiny_model.digest

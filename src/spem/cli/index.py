@@ -106,6 +106,9 @@ def remove(
     db: Address,
     shapes: Annotated[list[str] | None, typer.Argument(metavar="[ID|PATH]...", help="Ids or paths.")] = None,
     where: Where = None,
+    all_rows: Annotated[
+        bool, typer.Option("--all", help="All shapes, and the model with them; name it with --model.")
+    ] = False,
     model: ModelName = None,
 ) -> None:
     """Remove shapes from an index; their files stay.
@@ -115,13 +118,19 @@ def remove(
       spem index remove shapes.db 9f86d081884c7d659a2f
       spem index remove shapes.db shapes/old.obj
       spem index remove shapes.db --where "label = 'draft'"
+      spem index remove shapes.db --model 1f0b9c4d2e7a --all
     """  # noqa: D301
     index = opened(db)
-    if bool(shapes) == (where is not None):
-        msg = "give the ids or paths of shapes, or --where, and not both"
+    if bool(shapes) + (where is not None) + all_rows != 1 or (all_rows and model is None):
+        msg = "give the ids or paths of shapes, or --where, or --model with --all, and one of these alone"
         raise ParameterError(msg)
-    chosen = None if where is not None else index.find(shapes or [], model=model)
-    typer.echo(f"removed {counted(index.remove(chosen, where=where, model=model), 'shape')}")
+    if all_rows and model is not None:
+        removed = index.drop(model)
+    elif where is not None:
+        removed = index.remove(where=where, model=model)
+    else:
+        removed = index.remove(index.find(shapes or [], model=model), model=model)
+    typer.echo(f"removed {counted(removed, 'shape')}")
 
 
 def label(

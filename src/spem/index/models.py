@@ -79,6 +79,9 @@ def from_bytes(data: bytes, digest: str, address: str) -> Model:
         except ReadError as error:
             msg = f"{address}: model {digest} is damaged; add the shapes to a new index"
             raise ModelError(msg) from error
+        except ModelError as error:
+            msg = f"{address}: model {digest}: {str(error).removeprefix(f'{file}: ')}"
+            raise ModelError(msg) from error
     if model.digest != digest:
         msg = f"{address}: the model kept as {digest} is {model.digest}; add the shapes to a new index"
         raise ModelError(msg)

@@ -16,7 +16,7 @@ from spem.errors import ModelError, ParameterError, ReadError
 from spem.index import models
 from spem.index.database_errors import told
 from spem.index.extra import require
-from spem.index.filters import to_sql
+from spem.index.filters import literal, to_sql
 from spem.index.locking import one_writer
 from spem.index.row import Row
 from spem.index.schema import LAYOUT, LIGHT, layout_of, models_schema, schema, to_row
@@ -139,6 +139,23 @@ class Store:
             self.database.create_table(name, schema=schema(model.n_code), exist_ok=True)
         self._models[model.digest] = model
 
+    def drop_model(self, digest: str) -> int:
+        """Remove a model with its rows, and return how many there were.
+
+        Raises
+        ------
+        ModelError
+            When the index has no such model.
+        """
+        count = self.count(digest)
+        with self.writing():
+            # the rows first: a table of codes without a model would be of no use
+            self.database.drop_table(_CODES + digest)
+            self._open(MODELS).delete(f"digest = {literal(digest)}")
+        self._tables.pop(_CODES + digest, None)
+        self._models.pop(digest, None)
+        return count
+
     def load_model(self, digest: str, *, again: bool = False) -> Model:
         """Read a model; once, but where it is asked for again.
 
@@ -150,7 +167,7 @@ class Store:
         if again or digest not in self._models:
             self.table(digest)
             with told(self.address):
-                query = self._open(MODELS).search().where(f"digest = '{digest}'")
+                query = self._open(MODELS).search().where(f"digest = {literal(digest)}")
                 records = query.select(["model"]).limit(1).to_list()
             data = records[0]["model"] if records else b""
             self._models[digest] = models.from_bytes(data, digest, self.address)
@@ -305,20 +322,18 @@ class Store:
 
 def _check_folder(folder: Path, *, create: bool) -> None:
     """Refuse a file, a folder of other things and, unless one may be made, an index that is not there."""
-    if folder.is_file():
-        msg = f"{folder}: a file, not an index; an index is a folder, made with: spem index add DB SHAPES"
-        raise ReadError(msg)
-    if not folder.is_dir():
-        if not create:
-            msg = f"{folder}: no index there; make one with: spem index add {folder} SHAPES"
-            raise ReadError(msg)
-        return
     try:
-        inside = [path.name for path in folder.iterdir()]
+        if folder.is_file():
+            msg = f"{folder}: a file, not an index; an index is a folder, made with: spem index add DB SHAPES"
+            raise ReadError(msg)
+        inside = [path.name for path in folder.iterdir()] if folder.is_dir() else None
     except OSError as error:
         msg = f"{folder}: cannot be read ({error.strerror}); check its permissions"
         raise ReadError(msg) from error
-    others = [name for name in inside if name != _WORK and not name.startswith(".")]
+    if inside is None and not create:
+        msg = f"{folder}: no index there; make one with: spem index add {folder} SHAPES"
+        raise ReadError(msg)
+    others = [name for name in inside or () if name != _WORK and not name.startswith(".")]
     if others and not any(name.endswith(".lance") for name in others):
         msg = f"{folder}: a folder of other things ({min(others)}), not an index; give an empty or a new one"
         raise ReadError(msg)
