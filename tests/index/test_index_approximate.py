@@ -16,6 +16,8 @@ from spem.index.index import Index
 from spem.index.row import Row
 from spem.index.updates import write
 
+pytestmark = pytest.mark.usefixtures("few_queries")
+
 
 def test_optimize_builds_measures_and_drops(crowd: Index) -> None:
     """The approximate index is there when asked for, its recall told and kept, and gone when not wanted."""

@@ -90,6 +90,7 @@ def test_components_of_no_pairs() -> None:
     assert components(np.empty((0, 2), np.intp), 0) == []
 
 
+@pytest.mark.usefixtures("few_queries")
 def test_the_approximate_index_finds_the_same_groups(crowd: Index, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where pairs are asked of the approximate index the groups are those of all pairs."""
     exact = crowd.duplicates(0.12)
