@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from spem.errors import ModelError, ParameterError, ReadError
 from spem.index.batches import Batches
 from spem.index.changes import Known, Plan, place, plan
 from spem.index.encoding import Describe, Described
-from spem.index.executors import Executor, Item, LocalExecutor
+from spem.index.executors import Executor, Item, LocalExecutor, Outcomes
 from spem.index.naming import Labelling
 from spem.index.row import Row
 from spem.index.store import Store
@@ -189,8 +190,9 @@ def _encode(store: Store, listing: Listing, todo: Plan, model: Model, drafts: Dr
         manner.progress("codes", done, total)
 
     manner.progress("codes", done, total)
-    with Batches(lambda rows: write(store, model.digest, rows), written) as batches:
-        for item, described, reason in _described(items, model, drafts, manner):
+    outcomes = _described(items, model, drafts, manner)
+    with Batches(lambda rows: write(store, model.digest, rows), written) as batches, closing(outcomes):
+        for item, described, reason in outcomes:
             if described is None:
                 listing.fail(item.source, reason, item.key)
                 batches.add(())
@@ -219,14 +221,16 @@ def _annotate(store: Store, listing: Listing, todo: Plan, model: Model, manner: 
 
 def _described(
     items: Sequence[Item], model: Model, drafts: Drafts, manner: Manner
-) -> Iterator[tuple[Item, Described | None, str]]:
+) -> Outcomes[Item, Described]:
     """Yield what each source comes to: those of the sample from their drafts, others from their files."""
     ready = [item for item in items if drafts.has(item.key)]
     others = [item for item in items if not drafts.has(item.key)]
     local = LocalExecutor(manner.n_jobs)
-    yield from local.run(Finish(drafts, model), ready)
+    with closing(local.run(Finish(drafts, model), ready)) as outcomes:
+        yield from outcomes
     describe = Describe(model, manner.keep_shapes, manner.threads)
-    yield from manner.executor.run(describe, others)
+    with closing(manner.executor.run(describe, others)) as outcomes:
+        yield from outcomes
 
 
 def _summary(listing: Listing, todo: Plan, model: Model) -> Added:

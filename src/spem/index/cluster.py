@@ -19,7 +19,7 @@ from threadpoolctl import threadpool_limits
 
 from spem.codes.workers import one_line
 from spem.errors import ClusterError
-from spem.index.executors import Item
+from spem.index.executors import Item, Outcomes
 from spem.index.extra import require
 
 T = TypeVar("T")
@@ -55,7 +55,7 @@ class ClusterExecutor:
     retries: int = 2
     idle: float = IDLE
 
-    def run(self, work: Callable[[T], R], tasks: Sequence[T]) -> Iterator[tuple[T, R | None, str]]:
+    def run(self, work: Callable[[T], R], tasks: Sequence[T]) -> Outcomes[T, R]:
         """Yield each task with its result, or None and one line why there is none, as they come.
 
         Raises

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeAlias, TypeVar
 
 from spem.codes.workers import run_all
 
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 R = TypeVar("R")
+#: Tasks with their results, or None and a reason; closed before the end, what is under way is given up.
+Outcomes: TypeAlias = Generator[tuple[T, R | None, str], None, None]
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Item:
 class Executor(Protocol):
     """Runs a function over tasks."""
 
-    def run(self, work: Callable[[T], R], tasks: Sequence[T]) -> Iterator[tuple[T, R | None, str]]:
+    def run(self, work: Callable[[T], R], tasks: Sequence[T]) -> Outcomes[T, R]:
         """Yield each task with its result, or None and one line why there is none, as they come.
 
         Parameters
@@ -64,6 +66,6 @@ class LocalExecutor:
 
     n_jobs: int = 1
 
-    def run(self, work: Callable[[T], R], tasks: Sequence[T]) -> Iterator[tuple[T, R | None, str]]:
+    def run(self, work: Callable[[T], R], tasks: Sequence[T]) -> Outcomes[T, R]:
         """Yield each task with its result; a process that dies costs no other task."""
-        return run_all(work, tasks, self.n_jobs)
+        yield from run_all(work, tasks, self.n_jobs)

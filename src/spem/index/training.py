@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -241,15 +242,16 @@ def _complete(
     todo = [Item(key, listing.first[key]) for key in keys if key not in ndims]
     done = total - len(todo)
     progress("fields", done, total)
-    for item, found, reason in executor.run(work, todo):
-        if found is None:
-            listing.fail(item.source, reason, item.key)
-            ndims[item.key] = ()
-        else:
-            drafts.save(item.key, found)
-            ndims[item.key] = tuple(each.row.ndim for each in found if each.row is not None)
-        done += 1
-        progress("fields", done, total)
+    with closing(executor.run(work, todo)) as outcomes:
+        for item, found, reason in outcomes:
+            if found is None:
+                listing.fail(item.source, reason, item.key)
+                ndims[item.key] = ()
+            else:
+                drafts.save(item.key, found)
+                ndims[item.key] = tuple(each.row.ndim for each in found if each.row is not None)
+            done += 1
+            progress("fields", done, total)
 
 
 def _commonest(ndims: dict[str, tuple[int, ...]]) -> tuple[int, int]:
