@@ -86,6 +86,15 @@ def test_real_shapes_are_skipped_without_data(name, tmp_path):
     assert result["skipped"]
 
 
+@pytest.mark.skipif(importlib.util.find_spec("plotly") is None, reason="plotly is not installed")
+def test_explorer_without_a_browser(tmp_path):
+    """Without a browser it is told what the first page loads, and that the rest was not run."""
+    result = _run("explorer", tmp_path, PATH="", SPEM_BROWSER="")
+    (rows,) = result["tables"].values()
+    assert sum(row["kB sent"] for row in rows) < 100
+    assert [reason.split(":")[0] for reason in result["skipped"]] == ["no browser"]
+
+
 @pytest.mark.skipif(importlib.util.find_spec("pyamg") is None, reason="pyamg is not installed")
 def test_speed_compares_with_every_hierarchy(tmp_path):
     """Each hierarchy of pyamg that is tried stands in the table, with the residual that it reached."""
