@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +24,8 @@ from spem.server.worker import LENGTH_BYTES
 # Seconds between two looks at whether to go on.
 _LOOK = 0.1
 _CHUNK = 1 << 20
+# Seconds that a process may take to end after it let go of its pipe.
+_LAST_BREATH = 1.0
 # Where the interpreter finds its packages and compiled kernels; nothing else of the server's is passed on.
 _KEPT = ("PATH", "PYTHONPATH", "PYTHONHOME", "LD_LIBRARY_PATH", "NUMBA_CACHE_DIR", "LANG", "LC_ALL", "TZ")
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -77,7 +80,9 @@ class Process:
 
     def alive(self) -> bool:
         """Tell whether it is there; it is not reaped, so that its number stays its own."""
-        return os.waitid(os.P_PID, self.process.pid, os.WEXITED | os.WNOWAIT | os.WNOHANG) is None
+        with contextlib.suppress(ChildProcessError):
+            return os.waitid(os.P_PID, self.process.pid, os.WEXITED | os.WNOWAIT | os.WNOHANG) is None
+        return False
 
     def send(self, body: bytes, go_on: Callable[[], None]) -> None:
         """Write a frame; `go_on` is called now and then, and raises to give up."""
@@ -104,17 +109,20 @@ class Process:
         return self._read(length, go_on)
 
     def kill(self) -> None:
-        """End it with all that it started, and remove its folder."""
+        """End it with all that it started, and remove its folder; its pipes stay open for who reads them."""
         with self._end:
             if self.process.returncode is not None:
                 return
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait()
-            for end in (self.requests, self.replies, self.lifeline):
-                with contextlib.suppress(OSError):
-                    os.close(end)
             shutil.rmtree(self.home, ignore_errors=True)
+
+    def drop(self) -> None:
+        """Kill it and close its pipes: for who has it to himself."""
+        self.kill()
+        for end in (self.requests, self.replies, self.lifeline):
+            os.close(end)
 
     def _read(self, count: int, go_on: Callable[[], None]) -> bytes:
         """Read so many bytes."""
@@ -129,11 +137,20 @@ class Process:
                 parts += part
         return bytes(parts)
 
+    def _fate(self) -> tuple[bool, int]:
+        """Return whether it was killed, and the signal or its status; a live one is about to be killed."""
+        with contextlib.suppress(ChildProcessError):
+            found = os.waitid(os.P_PID, self.process.pid, os.WEXITED | os.WNOWAIT | os.WNOHANG)
+            if found is not None:
+                return found.si_code != os.CLD_EXITED, found.si_status
+        return True, signal.SIGKILL
+
     def _dead(self) -> SandboxError:
         """Say how it died."""
-        found = os.waitid(os.P_PID, self.process.pid, os.WEXITED | os.WNOWAIT)
-        killed = found is not None and found.si_code != os.CLD_EXITED
-        status = 0 if found is None else found.si_status
+        end = time.monotonic() + _LAST_BREATH
+        while self.alive() and time.monotonic() < end:
+            time.sleep(_LAST_BREATH / 100)
+        killed, status = self._fate()
         if killed and status == signal.SIGXCPU:
             msg = "stopped at the time limit of a task; send a smaller or coarser shape"
             return SandboxError(msg, "time")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import queue
 import tempfile
 import threading
 import time
@@ -62,9 +60,9 @@ class Sandbox:
         self.n_workers, self.memory_limit, self.seconds = n_workers, memory_limit, seconds
         self._folder = tempfile.TemporaryDirectory(prefix="spem-sandbox-", ignore_cleanup_errors=True)
         # last in, first out: the worker whose memory is warm
-        self._free: queue.LifoQueue[Process] = queue.LifoQueue()
+        self._free: list[Process] = []
         self._all: set[Process] = set()
-        self._lock = threading.Lock()
+        self._changed = threading.Condition()
         self._closed = threading.Event()
         self._trouble = ""
         self._counts: Counter[str] = Counter()
@@ -124,14 +122,15 @@ class Sandbox:
         if reply.get("retire"):
             self._discard(worker, "retired")
         else:
-            self._free.put(worker)
+            self._give(worker)
         return self._outcome(task, reply, arrays)
 
     def stats(self) -> dict[str, int]:
         """Return how many workers there are, are free, and were started and stopped, by reason."""
+        self._reap()
         return {
             "workers": self.n_workers,
-            "free": self._free.qsize(),
+            "free": len(self._free),
             **{
                 name: self._counts[name]
                 for name in ("started", "done", "refused", "time", "memory", "died", "cancelled", "retired")
@@ -145,11 +144,15 @@ class Sandbox:
     def close(self) -> None:
         """Kill all workers; tasks under way raise a `SandboxError`."""
         self._closed.set()
-        with self._lock:
-            workers = list(self._all)
+        with self._changed:
+            idle, busy = self._free[:], self._all - set(self._free)
             self._all.clear()
-        for worker in workers:
+            self._free.clear()
+            self._changed.notify_all()
+        for worker in busy:
             worker.kill()
+        for worker in idle:
+            worker.drop()
         self._folder.cleanup()
 
     def __enter__(self) -> Self:
@@ -163,14 +166,34 @@ class Sandbox:
     def _take(self, stopped: threading.Event) -> Process:
         """Wait for a free worker."""
         while not stopped.is_set() and not self._closed.is_set():
-            with contextlib.suppress(queue.Empty):
-                worker = self._free.get(timeout=_LOOK)
-                if worker.alive():
-                    return worker
+            with self._changed:
+                if not self._free:
+                    self._changed.wait(_LOOK)
+                worker = self._free.pop() if self._free else None
+            if worker and worker.alive():
+                return worker
+            if worker:
                 self._discard(worker, "died")
             if self._trouble and not self._all:
                 raise SandboxError(self._trouble)
         raise self._stopped(stopped)
+
+    def _give(self, worker: Process) -> None:
+        """Put a worker among the free ones."""
+        with self._changed:
+            if not self._closed.is_set():
+                self._free.append(worker)
+                self._changed.notify()
+                return
+        worker.drop()
+
+    def _reap(self) -> None:
+        """Replace free workers that died."""
+        with self._changed:
+            dead = [worker for worker in self._free if not worker.alive()]
+            self._free[:] = [worker for worker in self._free if worker not in dead]
+        for worker in dead:
+            self._discard(worker, "died")
 
     def _exchange(
         self,
@@ -231,9 +254,9 @@ class Sandbox:
     def _discard(self, worker: Process, why: str) -> None:
         """Kill a worker and start another in its place."""
         self._counts[why] += 1
-        with self._lock:
+        with self._changed:
             self._all.discard(worker)
-        worker.kill()
+        worker.drop()
         self._start()
 
     def _start(self) -> None:
@@ -245,27 +268,29 @@ class Sandbox:
         """Start a worker and wait until it is warm; try again where it does not come up."""
         pause = _RETRY
         while not self._closed.is_set():
-            worker = self._new()
-            if worker is None:
-                return
+            worker = None
             try:
+                worker = self._new()
+                if worker is None:
+                    return
                 worker.receive(self.memory_limit, partial(self._patience, time.monotonic() + _START))
-            except SpemError as error:
-                with self._lock:
-                    self._all.discard(worker)
-                worker.kill()
+            except (SpemError, OSError) as error:
+                if worker:
+                    with self._changed:
+                        self._all.discard(worker)
+                    worker.drop()
                 self._trouble = f"worker processes do not start: {error}"
                 self._closed.wait(pause)
                 pause = min(2 * pause, _LONGEST_RETRY)
                 continue
             self._trouble = ""
             self._counts["started"] += 1
-            self._free.put(worker)
+            self._give(worker)
             return
 
     def _new(self) -> Process | None:
         """Start a process, unless the sandbox is closed."""
-        with self._lock:
+        with self._changed:
             if self._closed.is_set():
                 return None
             worker = Process.start(Path(self._folder.name), self.memory_limit)

@@ -47,7 +47,7 @@ def safe_name(name: str) -> str:
     """
     last = unicodedata.normalize("NFC", name.replace("\\", "/")).rpartition("/")[2]
     clean = "".join(c if unicodedata.category(c)[0] in _SHOWN or c in _PLAIN else "_" for c in last)
-    clean = clean.strip(" .")
+    clean = clean.lstrip().rstrip(" .")
     suffix = next((end for end in reversed(SUFFIXES) if clean.lower().endswith(end)), "")
     stem = clean.removesuffix(clean[len(clean) - len(suffix) :]) if suffix else clean
     stem = stem[:_LONGEST_NAME].strip(" .") or "shape"
