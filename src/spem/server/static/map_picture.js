@@ -126,7 +126,7 @@ export class MapPicture {
     const roomy = new Set();
     for (const spot of this.placed) {
       if (roomy.size >= MOST_PICTURES) break;
-      if (near(spot).every((other) => other === spot || apart(spot, other) > 0.75 * side)) roomy.add(spot);
+      if (near(spot).every((other) => other === spot || apart(spot, other) > 0.9 * side)) roomy.add(spot);
     }
     return roomy;
   }

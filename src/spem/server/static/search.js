@@ -17,6 +17,11 @@ export async function renderSearch(root, _parameters, state, setState) {
   return { update: (changed) => page.update(changed), destroy: () => page.stop() };
 }
 
+function lasting(seconds) {
+  if (seconds < 0.001) return "less than 1 ms";
+  return seconds < 0.1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`;
+}
+
 class Answers {
   constructor(root, setState) {
     this.root = root;
@@ -101,7 +106,7 @@ class Answers {
   }
 
   title(query, answers, method, seconds) {
-    const took = seconds === undefined ? "" : ` in ${seconds < 0.1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`}`;
+    const took = seconds === undefined ? "" : ` in ${lasting(seconds)}`;
     const facts = [query.label, `${query.ndim}-D`, counted(query.n_nodes ?? 0, "node")].filter(Boolean).join(" · ");
     const sent = String(query.id).startsWith("upload-");
     return element(
