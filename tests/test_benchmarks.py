@@ -17,6 +17,7 @@ WITHOUT_DATA = (
     "cluster",
     "convergence",
     "geodesics",
+    "hostile",
     "index_kill",
     "parts_silhouettes",
     "patches",
