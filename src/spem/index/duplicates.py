@@ -28,6 +28,8 @@ from spem.index.store import Store
 DISTANCE = 0.05
 # Codes of a block that is compared with all others by one product.
 _BLOCK = 1024
+# Distances within a group that are in memory at a time.
+_DISTANCES = 2**22
 # Cosines in float32 are right to this; pairs so near the limit are compared in float64.
 _ROUNDING = 1e-5
 _MANY_PAIRS = 20_000_000
@@ -157,8 +159,10 @@ def find_duplicates(
         vectors = snapshot.vectors if where is None else snapshot.vectors[places]
         way = pinned.approximation if len(places) > EXACT_ROWS else None
         pairs = _asked_pairs(way, snapshot, places, limit) if way else near_pairs(vectors, limit)
-        found = [_Found.of(vectors, members) for members in components(pairs, len(places))]
-        order = sorted(found, key=lambda one: (-len(one.members), snapshot.ids[places[one.members[0]]]))
+        ids = snapshot.ids[places]
+        together = components(pairs, len(places))
+        found = [_Found.of(vectors, members[np.argsort(ids[members])]) for members in together]
+        order = sorted(found, key=lambda one: (-len(one.members), ids[one.members[0]]))
         groups = tuple(_group(store, snapshot, places, one) for one in order)
         copies = store.rows(digest, _COPIED if where is None else f"({where}) AND {_COPIED}")
     return Duplicates(groups, tuple(copies), limit, "exact" if way is None else "approximate")
@@ -231,20 +235,19 @@ class _Found:
     @classmethod
     def of(cls, vectors: NDArray[np.float32], members: NDArray[np.intp]) -> _Found:
         """Find the representative of a group."""
-        sums, diameter = np.empty(len(members)), 0.0
-        for start in range(0, len(members), _BLOCK):
-            block = np.stack(
-                [
-                    correlation_distances(vectors, members, vectors[each])
-                    for each in members[start : start + _BLOCK]
-                ]
-            )
-            sums[start : start + _BLOCK] = block.sum(axis=1)
+        codes = vectors[members].astype(np.float64)
+        codes /= np.linalg.norm(codes, axis=1, keepdims=True)
+        sums, diameter, step = np.empty(len(members)), 0.0, max(1, _DISTANCES // len(members))
+        for start in range(0, len(members), step):
+            block = np.maximum(1 - codes[start : start + step] @ codes.T, 0)
+            sums[start : start + step] = block.sum(axis=1)
             diameter = max(diameter, float(block.max()))
-        distances = correlation_distances(vectors, members, vectors[members[sums.argmin()]])
+        # of a pair both are as good but for rounding
+        middle = int(np.argmax(sums <= sums.min() + _ROUNDING))
+        distances = correlation_distances(vectors, members, vectors[members[middle]])
         order = np.argsort(distances, kind="stable")
         # the representative leads, whatever is equal to it
-        order = np.concatenate([[sums.argmin()], order[order != sums.argmin()]])
+        order = np.concatenate([[middle], order[order != middle]])
         return cls(members[order], distances[order], diameter)
 
 

@@ -107,6 +107,8 @@ def _approximation(
 def _size(store: Store, table: Any) -> int:
     """Return the bytes that a table takes."""
     if store.folder is None:
-        return int(table.stats()["total_bytes"])
+        return int(table.stats()["total_bytes"]) + sum(
+            index.size_bytes or 0 for index in table.list_indices()
+        )
     folder = Path(store.folder, f"{table.name}.lance")
     return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
