@@ -105,7 +105,7 @@ def create_app(index: Index, options: ServerOptions | None = None) -> FastAPI:
 def _names(options: ServerOptions) -> frozenset[str]:
     """Return the names that this server answers to."""
     own = ("localhost", options.host, *options.hosts)
-    machine = () if options.loopback else (socket.gethostname(), socket.getfqdn())
+    machine = () if options.loopback else (socket.gethostname(),)
     return frozenset(name.lower() for name in (*own, *machine))
 
 

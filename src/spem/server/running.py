@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import socket
 import sys
 
@@ -64,6 +65,14 @@ def run(index: Index, options: ServerOptions, opened: socket.socket) -> None:
         timeout_graceful_shutdown=max(1, round(options.finish_seconds)),
     )
     configure()
+    server = uvicorn.Server(config)
+
+    def stop(*_: object) -> None:
+        server.should_exit = True
+
+    # The server gives signals back when it has stopped, which would end the process by them and not with 0.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
     # Products of search are small; threads of their own would only get in the way of those of requests.
     with opened, threadpool_limits(1):
-        uvicorn.Server(config).run(sockets=[opened])
+        server.run(sockets=[opened])
