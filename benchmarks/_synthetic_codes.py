@@ -59,12 +59,16 @@ class Statistics:
         count = n_classes or -(-n // A_CLASS)
         classes = self.mean + rng.standard_normal((count, size)) @ self.between
         which = rng.integers(count, size=n)
+        classes, within = classes.astype(np.float32), self.within.astype(np.float32)
         out = np.empty((n, size), np.float32)
         for start in range(0, n, _BATCH):
             some = which[start : start + _BATCH]
-            noise = rng.standard_normal((len(some), size), np.float32) @ self.within.astype(np.float32)
-            noise *= rng.choice(self.widths, (len(some), 1))
-            out[start : start + _BATCH] = standardised_codes(classes[some] + noise)
+            codes = rng.standard_normal((len(some), size), np.float32) @ within
+            codes *= rng.choice(self.widths.astype(np.float32), (len(some), 1))
+            codes += classes[some]
+            codes -= codes.mean(axis=1, keepdims=True)
+            codes /= np.linalg.norm(codes, axis=1, keepdims=True)
+            out[start : start + _BATCH] = codes
         return out
 
 
