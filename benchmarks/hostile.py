@@ -45,7 +45,7 @@ def main(argv: list[str] | None = None) -> None:
         read = against_readers(cases, root / "a" / "b")
         benchmark.table("readers", tabulated(cases, read))
         benchmark.table("readers, findings", findings(cases, read))
-        served, facts = asyncio.run(against_server(cases, root))
+        served, facts = asyncio.run(against_server(cases, root, n_workers=1 if benchmark.quick else 2))
         benchmark.table("server", tabulated(cases, served))
         benchmark.table("server, findings", findings(cases, served))
         changed = sorted(set(snapshot(root).items()) ^ set(before.items()))
@@ -115,7 +115,7 @@ def read_on(folder: Path, records: list[Row]) -> str:
             records += [json.loads(line) for line in lines]
 
 
-async def against_server(cases: list[Case], root: Path) -> tuple[list[Row], dict[str, Any]]:
+async def against_server(cases: list[Case], root: Path, n_workers: int) -> tuple[list[Row], dict[str, Any]]:
     """Send all files to a server, one after another, and wait for what comes of each."""
     import httpx
 
@@ -133,7 +133,7 @@ async def against_server(cases: list[Case], root: Path) -> tuple[list[Row], dict
         index.add(shapes, model=model)
         models[model.ndim] = model.digest
     options = ServerOptions(
-        n_workers=2, memory=1 << 30, seconds=30.0, rate=0, state=root / "state", token="t" * 32
+        n_workers=n_workers, memory=1 << 30, seconds=30.0, rate=0, state=root / "state", token="t" * 32
     )
     app = create_app(index, options)
     records = []
