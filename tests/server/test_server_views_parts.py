@@ -13,6 +13,7 @@ from spem.errors import ParameterError
 from spem.server.arrays import pack_arrays
 from spem.server.views import VIEWS
 from spem.server.views import division as division_module
+from spem.server.views import source as source_module
 from spem.server.views.division import divide, on_shape
 from spem.server.views.options import coarser_shape
 
@@ -145,6 +146,15 @@ def test_fields_of_all_patches_share_the_boundary(cross):
     total = sum(np.exp(arrays["log"].astype(float)) for _, arrays in replies + rest)
     np.testing.assert_allclose(total, 1.0, rtol=1e-5)
     assert sum(header["share"] for header, _ in replies + rest) == pytest.approx(1.0)
+
+
+def test_large_shapes_are_factored_anew(monkeypatch):
+    """What is kept of a small shape is what a large one is solved with each time."""
+    disk = spem.synthetic.disk(radius=20.0, spacing=1.0)
+    _, kept = source_of(disk, {"patch": 5})
+    monkeypatch.setattr(source_module, "_KEPT_NODES", 10)
+    _, anew = source_of(disk, {"patch": 5})
+    np.testing.assert_array_equal(kept["log"], anew["log"])
 
 
 def test_nodes_that_are_not_reached_are_counted():

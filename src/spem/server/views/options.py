@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import lru_cache
-from hashlib import sha256
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError, ShapeError
+from spem.server.views.shape_key import ShapeKey
 from spem.shapes.rescale import to_voxel_budget
 from spem.shapes.shape import Shape
 
@@ -83,38 +82,18 @@ def coarser_shape(shape: Shape, n_nodes: int) -> Shape:
     """
     if shape.n_nodes <= n_nodes:
         return shape
-    coarse = _resampled(_Wanted(_digest(shape), n_nodes, shape))
+    coarse = _resampled(ShapeKey.of(shape), n_nodes)
     return shape if coarse is None else coarse
 
 
-@dataclass(frozen=True)
-class _Wanted:
-    """A shape on another grid; shapes of equal digest are the same."""
-
-    digest: bytes
-    n_nodes: int
-    shape: Shape = field(compare=False)
-
-
 @lru_cache(maxsize=4)
-def _resampled(wanted: _Wanted) -> Shape | None:
+def _resampled(key: ShapeKey, n_nodes: int) -> Shape | None:
     """Return the coarser shape, None where too much of it would be lost."""
     try:
-        coarse = to_voxel_budget(wanted.shape, wanted.n_nodes)
+        coarse = to_voxel_budget(key.shape, n_nodes)
     except ShapeError:
         return None
-    return coarse if abs(coarse.volume / wanted.shape.volume - 1) < _VOLUME_CHANGE else None
-
-
-def _digest(shape: Shape) -> bytes:
-    """Return what tells shapes apart: name, grid, inside, cuts and surface."""
-    cuts, surface = shape.cuts, shape.surface
-    arrays: list[NDArray[Any]] = [np.packbits(shape.mask), cuts.voxel, cuts.direction, cuts.fraction]
-    if surface is not None:
-        arrays += [surface.vertices, surface.faces]
-    sizes = [array.shape for array in arrays]
-    said = repr((shape.name, shape.mask.shape, shape.spacing, shape.origin, sizes)).encode()
-    return sha256(said + b"".join(array.tobytes() for array in arrays)).digest()
+    return coarse if abs(coarse.volume / key.shape.volume - 1) < _VOLUME_CHANGE else None
 
 
 def plain_length(rho: float) -> float | str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from spem.api.parts import part_sources
 from spem.decomposition.transfer import sample_points
 from spem.fields.boundary.sources import Sources
 from spem.plots.refinement import refine
+from spem.server.views.shape_key import ShapeKey
 from spem.shapes.boundary_surface import boundary_surface
 from spem.shapes.remeshing import decimate
 from spem.shapes.shape import Shape
@@ -70,12 +72,20 @@ class Mesh:
 def shown_sources(shape: Shape) -> Sources:
     """Return the patches of the boundary that can be pointed at, where the fields take their boundary.
 
+    Those of the last shapes are kept.
+
     Examples
     --------
     >>> shown_sources(Shape.from_mask(np.ones((5, 5)))).n_sources
     20
     """
-    return part_sources(shape, PATCHES, boundary="surface")
+    return _sources(ShapeKey.of(shape))
+
+
+@lru_cache(maxsize=2)
+def _sources(key: ShapeKey) -> Sources:
+    """Divide the boundary of a shape."""
+    return part_sources(key.shape, PATCHES, boundary="surface")
 
 
 def grid_units(shape: Shape, positions: NDArray[np.float64]) -> NDArray[np.float64]:
