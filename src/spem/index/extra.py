@@ -9,7 +9,7 @@ from typing import Any
 from spem.errors import MissingExtraError
 
 # The database writes warnings of its own to stderr; what matters is raised.
-_QUIET = {"LANCE_LOG": "error", "RUST_LOG": "error"}
+_QUIET = {"LANCEDB_LOG": "error", "LANCE_LOG": "error"}
 
 
 def require(module: str, extra: str = "index") -> Any:

@@ -29,6 +29,7 @@ _WORK = "work"
 # Readers hold on to a version for no longer.
 _KEPT = timedelta(hours=1)
 _INSTANT = timedelta(milliseconds=1)
+_ATTEMPTS = 5
 _PAGE = 1000
 
 
@@ -285,9 +286,18 @@ class Store:
         # the database warns of no time at all
         age = max(older_than, _INSTANT)
         for name in (MODELS, *(_CODES + digest for digest in self.digests())):
+            self._compact(name, age)
+
+    def _compact(self, name: str, age: timedelta, attempts: int = _ATTEMPTS) -> None:
+        """Compact a table; on object storage any other write has the better right, and it is tried again."""
+        try:
             with self.writing():
-                # With the lock held no write is going on, so leftovers of writers that were killed may go.
-                self._open(name).optimize(cleanup_older_than=age, delete_unverified=self.folder is not None)
+                # files of no version may be those of a write that goes on: the database keeps them for a week
+                self._open(name).optimize(cleanup_older_than=age)
+        except ParameterError:
+            if self.folder is not None or attempts == 1:
+                raise
+            self._compact(name, age, attempts - 1)
 
     def _open(self, name: str) -> Any:
         """Open a table, once."""
