@@ -71,7 +71,7 @@ def square(size: int) -> bytes:
 
 
 def test_stops_on_sigterm_and_keeps_its_jobs(folder, tmp_path):
-    """Told to stop a server ends with status 0, its workers with it; its jobs are done or kept for the next."""
+    """Told to stop a server ends with status 0, its workers too; its jobs are done or kept for the next."""
     state = tmp_path / "state"
     with running(folder, "--state", str(state)) as (client, process):
         files = [{"file": ("box.npy", square(size))} for size in (12, 13, 14)]
