@@ -99,8 +99,13 @@ class Comparison {
     const { correlation, n_words: count } = words.header;
     const total = found.reduce((sum, { share }) => sum + share, 0);
     const alike = correlation > 0;
-    const brought = alike ? `: ${shown(total, 2)} of ${shown(correlation, 2)}` : `, ${shown(total, 2)}, though all words together come to ${shown(correlation, 2)}`;
-    const note = `Visual words are what codes are made of: typical surroundings of a point. Of ${count} words these ${found.length} bring most to the correlation of the two codes${brought}. The points that say so are marked on both.`;
+    const all = shown(correlation, 2);
+    const note = [
+      "Visual words are what codes are made of: typical surroundings of a point.",
+      `Of ${count} words these ${found.length} bring most to the correlation of the two codes:`,
+      alike ? `${shown(total, 2)} of ${all}.` : `${shown(total, 2)}, though all words together come to ${all}.`,
+      "The points that say so are marked on both.",
+    ].join(" ");
     this.list = element("ol", { class: "shape-legend words" });
     this.why.replaceChildren(element("h3", {}, alike ? "Why they are alike" : "What they share"), element("p", { class: "shape-note" }, note), this.list);
     this.mark(null);

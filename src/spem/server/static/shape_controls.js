@@ -7,7 +7,7 @@ import { shown } from "./shape_colouring.js";
 /** Steps of the slider between two sampled rho. */
 const FINE = 0.02;
 const MOST_PARTS = 12;
-export const SHOWN = { field: "Field", map: "Map", parts: "Parts", source: "Source" };
+const SHOWN = { field: "Field", map: "Map", parts: "Parts", source: "Source" };
 
 function choices(name, legend, entries, onChoice, kind) {
   const inputs = {};
@@ -104,7 +104,7 @@ export class Controls {
         element("label", { for: "shape-source" }, "Source"),
         button("Previous source", "−", -1), this.source, button("Next source", "+", 1)),
       element("p", { class: "shape-note" },
-        `${this.solid ? "Click the surface" : "Click the contour"} to choose one of ${this.nSources} patches of the boundary: it is held at 1 and the rest at 0.`),
+        `Click the ${this.solid ? "surface" : "contour"} to choose one of ${this.nSources} patches of the boundary: it is held at 1 and the rest at 0.`),
       this.sourceNote,
     );
   }

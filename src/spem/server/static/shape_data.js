@@ -7,7 +7,7 @@ import { unpackArrays } from "./arrays.js";
 const RIM = 2;
 
 /** Nodes on their grid. */
-export class Geometry {
+class Geometry {
   constructor({ header, arrays }) {
     Object.assign(this, { header, arrays });
     this.ndim = header.ndim;
@@ -101,7 +101,7 @@ export class Geometry {
 }
 
 /** Fields of all rho, as combinations of a few columns. */
-export class Fields {
+class Fields {
   constructor({ header, arrays }) {
     this.header = header;
     this.basis = arrays.basis.values;

@@ -49,7 +49,7 @@ export function pageColour(name) {
 
 /** Draw a ring about a point, seen on light and on dark. */
 export function ring(context, x, y, radius, colour) {
-  for (const [width, stroke] of [[4, "rgb(0 0 0 / 65%)"], [2, colour]]) {
+  for (const [width, stroke] of [[5, "rgb(0 0 0 / 75%)"], [2.5, colour]]) {
     context.beginPath();
     context.arc(x, y, radius, 0, 2 * Math.PI);
     context.lineWidth = width;
