@@ -162,7 +162,9 @@ class Process:
 def _environment(home: Path) -> dict[str, str]:
     """Return the environment of a worker."""
     kept = {name: os.environ[name] for name in _KEPT if name in os.environ}
-    folders = dict.fromkeys(("HOME", "TMPDIR", "XDG_CACHE_HOME", "MPLCONFIGDIR"), str(home))
+    folders = dict.fromkeys(("HOME", "TMPDIR", "XDG_CONFIG_HOME"), str(home))
+    # compiled kernels lie there where the package cannot be written; without them a start takes a minute
+    folders["XDG_CACHE_HOME"] = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return (
         kept | folders | dict.fromkeys(_THREADS, "1") | {"MPLBACKEND": "agg", "PYTHONDONTWRITEBYTECODE": "1"}
     )

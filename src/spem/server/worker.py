@@ -6,6 +6,7 @@ the server, speaks in bodies of `spem.server.arrays` alone, and has limits for m
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import resource
@@ -155,6 +156,9 @@ def _follow_parent(lifeline: int, home: Path) -> None:
     def watch() -> None:
         select.select([lifeline], [], [])
         shutil.rmtree(home, ignore_errors=True)
+        # the last one takes the folder of all with it
+        with contextlib.suppress(OSError):
+            home.parent.rmdir()
         os.killpg(0, signal.SIGKILL)
 
     threading.Thread(target=watch, daemon=True).start()
