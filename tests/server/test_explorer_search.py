@@ -44,13 +44,14 @@ def test_overlay_says_what_is_taken(tabs):
     expect(page.locator(".overlay")).not_to_be_visible()
 
 
-def test_chosen_solid_is_searched_with_its_model(tabs, explored):
-    """A file chosen with the button is searched for with the model that is looked at."""
-    page = tabs.open(f"?model={explored.solid}")
+def test_solid_is_searched_for_with_the_model_of_solids(tabs, explored):
+    """A mesh that is chosen while silhouettes are looked at is searched for among the solids."""
+    page = tabs.open()
     page.locator("#file").set_input_files(explored.folder / "meshes" / "fish_01.obj")
     page.locator(".answer").first.wait_for()
     expect(page.locator(".answer")).to_have_count(3)
     expect(page.locator(".answer").first).to_contain_text("fish_01")
+    expect(page.get_by_label("Model")).to_have_value(explored.solid)
 
 
 def test_file_that_cannot_be_taken_is_told(tabs, tmp_path):

@@ -13,7 +13,8 @@ export class ApiError extends Error {
 export function address(path, parameters = {}) {
   const url = new URL(path.replace(/^\//, ""), document.baseURI);
   const model = new URLSearchParams(location.search).get("model");
-  const given = model && path.replace(/^\//, "").startsWith("api/") ? { model, ...parameters } : parameters;
+  const given = { ...parameters };
+  if (model && url.pathname.includes("/api/")) given.model ??= model;
   for (const [key, value] of Object.entries(given)) {
     for (const one of Array.isArray(value) ? value : [value]) {
       if (one !== undefined && one !== null && one !== "") url.searchParams.append(key, one);
@@ -79,13 +80,13 @@ export function info() {
 }
 
 /** Send a file; `onProgress` hears of the share that is sent, and aborting the signal stops it. */
-export function upload(path, file, fields = {}, onProgress = () => {}, signal = undefined) {
+export function upload(path, file, { fields = {}, parameters = {}, onProgress = () => {}, signal } = {}) {
   const form = new FormData();
   for (const [key, value] of Object.entries(fields)) form.append(key, value);
   form.append("file", file, file.name);
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
-    request.open("POST", address(path));
+    request.open("POST", address(path, parameters));
     request.upload.addEventListener("progress", (event) => {
       if (event.lengthComputable) onProgress(event.loaded / event.total);
     });

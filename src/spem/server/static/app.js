@@ -43,7 +43,7 @@ function modelChoice(models, chosen) {
     const { q, label, ndim, sort } = readState();
     const state = new URLSearchParams({ model: event.target.value });
     for (const [key, value] of Object.entries({ q, label, ndim, sort })) if (value) state.set(key, value);
-    go(`${new URL(document.baseURI).pathname}?${state}`).then(about);
+    go(`${new URL(document.baseURI).pathname}?${state}`);
   };
   const options = models.map(({ digest, features, ndim, n_shapes }) => {
     const words = [ndim ? `${ndim}-D` : "", [].concat(features).join(", "), n_shapes.toLocaleString("en")];
@@ -59,5 +59,5 @@ function modelChoice(models, chosen) {
 
 takeFiles();
 keys();
+addEventListener("spem-page", about);
 start();
-about();

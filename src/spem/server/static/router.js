@@ -95,6 +95,7 @@ function mark(name) {
 async function draw(moved) {
   const found = matched();
   mark(found.name);
+  dispatchEvent(new CustomEvent("spem-page", { detail: found.name }));
   if (current?.page?.update && current.key === found.key) {
     current.page.update(readState());
     return;

@@ -5,6 +5,8 @@ import { announce, element, sized } from "./dom.js";
 import { go, href } from "./router.js";
 
 const ANSWERS = 48;
+/** Files that say of themselves how many dimensions they have. */
+const DIMENSIONS = [[2, /\.(png|gif|jpe?g|bmp|webp|p[gbpn]m)$/i], [3, /\.(obj|off|ply|stl|glb)$/i]];
 let sending = null;
 
 /** Take files from now on: by drop, paste, and the button of the header. */
@@ -81,6 +83,15 @@ export function refusal(file, { suffixes, limits }) {
   return file.size === 0 ? `${file.name} is empty.` : "";
 }
 
+/** The model to search with: that which is looked at, unless it is of other dimensions than the file. */
+export function modelFor(file, { models, model }) {
+  const [ndim] = DIMENSIONS.find(([, suffix]) => suffix.test(file.name)) ?? [];
+  const fits = (one) => !ndim || !one.ndim || one.ndim === ndim;
+  const current = models.find(({ digest }) => digest === model);
+  if (!current || fits(current)) return model;
+  return models.find(fits)?.digest ?? model;
+}
+
 /** Send a file and go to its answers. */
 export async function searchBy(file) {
   sending?.abort();
@@ -88,12 +99,16 @@ export async function searchBy(file) {
   sending = control;
   const panel = new Panel(file.name, () => control.abort());
   try {
-    const refused = refusal(file, await info());
+    const known = await info();
+    const refused = refusal(file, known);
     if (refused) throw new ApiError(refused);
     panel.say(`Sending ${sized(file.size)}`);
-    const { job } = await upload("api/search", file, { k: ANSWERS }, (share) => panel.show(share), control.signal);
+    const model = known.models.length > 1 ? modelFor(file, known) : null;
+    const onProgress = (share) => panel.show(share);
+    const options = { fields: { k: ANSWERS }, parameters: { model }, onProgress, signal: control.signal };
+    const { job } = await upload("api/search", file, options);
     panel.close();
-    if (sending === control) await go(href("./", { job }));
+    if (sending === control) await go(href("./", model ? { model, job } : { job }));
   } catch (error) {
     if (error.name === "AbortError") panel.close();
     else panel.fail(error.message, error.status ? () => searchBy(file) : null);
