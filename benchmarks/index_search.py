@@ -160,18 +160,15 @@ def whole(
     near = [np.array([one.distance for one in answers]) for answers in found]
     hits = [min(K, int((each <= 1 - c + 1e-5).sum())) for each, c in zip(near, tenth, strict=True)]
     recall = sum(hits) / (K * len(queries))
-    rows = []
-    for clients in CLIENTS:
-        times = latencies(index, queries, clients, exact=False)
-        rows.append({"clients": clients, "recall@10": recall} | quantiles(times[0]) | {"a second": times[1]})
+    rows = [{"recall@10": recall} | latencies(index, queries, clients, exact=False) for clients in CLIENTS]
     benchmark.table(f"approximate search of {len(vectors)} codes, {name}", rows)
     benchmark.target(f"recall@10, {name}", recall, RECALL, at_least=True)
     benchmark.target(f"approximate, one client, median ms, {name}", rows[0]["median ms"], LATENCY)
     plan(benchmark, name, row, rows[0])
 
 
-def latencies(index: Index, queries: Array, clients: int, *, exact: bool) -> tuple[list[float], float]:
-    """Return the seconds of each search, and searches a second, of clients that ask at the same time."""
+def latencies(index: Index, queries: Array, clients: int, *, exact: bool) -> Row:
+    """Return times of whole searches by clients that ask at once, and what one costs of the cores."""
 
     def ask(query: Array) -> float:
         """Return the seconds of one search."""
@@ -179,9 +176,11 @@ def latencies(index: Index, queries: Array, clients: int, *, exact: bool) -> tup
 
     ask(queries[0])
     with ThreadPoolExecutor(clients) as threads:
-        begin = time.perf_counter()
+        begin, cpu = time.perf_counter(), time.process_time()
         times = list(threads.map(ask, queries))
-        return times, len(queries) / (time.perf_counter() - begin)
+        cpu, seconds = time.process_time() - cpu, time.perf_counter() - begin
+    rates = {"CPU ms": cpu / len(queries) / MILLISECOND, "a second": len(queries) / seconds}
+    return {"clients": clients} | quantiles(times) | rates
 
 
 def quantiles(seconds: Sequence[float]) -> Row:
@@ -194,12 +193,10 @@ def exact(benchmark: Benchmark, folder: Path, vectors: Array, queries: Array, co
     """Time exact search from memory through the facade."""
     index = index_of(folder, vectors, codes, np.random.default_rng(1))
     first, _ = timed(lambda: index.search(queries[0], K, exact=True))
-    rows = []
-    for clients in CLIENTS:
-        times, rate = latencies(index, queries, clients, exact=True)
-        rows.append(
-            {"clients": clients, "first ms": first / MILLISECOND} | quantiles(times) | {"a second": rate}
-        )
+    rows = [
+        {"first ms": first / MILLISECOND} | latencies(index, queries, clients, exact=True)
+        for clients in CLIENTS
+    ]
     benchmark.table(f"exact search of {len(vectors)} codes of {vectors.shape[1]} numbers", rows)
     benchmark.target("exact, one client, median ms", rows[0]["median ms"], EXACT)
 
