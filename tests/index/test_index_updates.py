@@ -15,7 +15,8 @@ import pytest
 
 from spem.codes.model import Model
 from spem.errors import ParameterError, ReadError
-from spem.index.changes import Plan
+from spem.index.changes import Plan, plan
+from spem.index.filters import literal
 from spem.index.index import Index
 from spem.index.row import Row
 from spem.index.updates import annotate, known, relocate, remove, remove_where, write
@@ -85,14 +86,28 @@ def test_paths_start_from_the_index(
     assert moved.find([str(Path("two", "hen.png"))]) == [ready_row("hen").id]
 
 
+def test_names_that_are_no_text_are_kept_as_escapes(
+    tmp_path: Path, tiny_model: Model, ready_row: Maker
+) -> None:
+    """A file whose name is no UTF-8 has a row, and is found again."""
+    index = Index.open(tmp_path / "db")
+    index.store.save_model(tiny_model)
+    odd = os.fsdecode(b"/nowhere/caf\xe9.png")
+    row = replace(ready_row("odd"), path=odd, name=os.fsdecode(b"caf\xe9"))
+    write(index.store, tiny_model.digest, [row, ready_row("cow")])
+    assert plan(known(index.store, tiny_model.digest), [(Path(odd), row.hash)]).n_unchanged == 1
+    assert index.find([odd]) == [row.id]
+    assert index.rows(f"path = {literal(odd)}")[0].name == "caf\\udce9"
+
+
 def test_relocate_moves_paths_and_deletes_rows_without(filled: Index, tiny_model: Model) -> None:
     """A plan's paths are gained and lost; a row without a path goes, with all labels of its content."""
     hashes = {row.name: row.hash for row in filled.rows()}
-    plan = Plan(
+    moves = Plan(
         gained={hashes["cat"]: ("/new/cat.png",), hashes["dog"]: ("/new/dog.png",)},
         lost={hashes["cat"]: ("/nowhere/cat.png",), hashes["cow"]: ("/nowhere/cow.png",)},
     )
-    assert relocate(filled.store, tiny_model.digest, plan) == 1
+    assert relocate(filled.store, tiny_model.digest, moves) == 1
     rows = {row.name: row for row in filled.rows()}
     assert set(rows) == {"cat", "dog", "d'oh"}
     assert (rows["cat"].path, rows["cat"].copies) == ("/new/cat.png", ())

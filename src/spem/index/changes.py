@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from spem.codes.sources import Source, source_path
+from spem.index.filters import as_text
 from spem.shapes.kinds import SUFFIXES, has_suffix
 from spem.shapes.shape import Shape
 
@@ -132,7 +133,7 @@ def place(path: str) -> Path:
 
 def _place(path: str, working: str) -> str:
     """Return where a file lies as text, which is quicker for many of them."""
-    folder, name = os.path.split(path)
+    folder, name = os.path.split(as_text(path))
     return os.path.join(_resolved(folder, working), name)  # noqa: PTH118
 
 

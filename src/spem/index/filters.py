@@ -25,7 +25,18 @@ def literal(text: str) -> str:
     if "\0" in text:
         msg = f"{text!r}: text of a filter holds a null character; leave it out"
         raise ParameterError(msg)
-    return "'" + text.replace("'", "''") + "'"
+    return "'" + as_text(text).replace("'", "''") + "'"
+
+
+def as_text(text: str) -> str:
+    r"""Return text that can be stored: bytes of a file's name that are no UTF-8 as escapes.
+
+    Examples
+    --------
+    >>> print(as_text("caf\udce9.png"))
+    caf\udce9.png
+    """
+    return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode()
 
 
 def any_of(column: str, values: list[str] | tuple[str, ...]) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spem.index.extra import require
+from spem.index.filters import as_text
 from spem.index.row import Row
 
 if TYPE_CHECKING:
@@ -97,6 +98,7 @@ def to_table(rows: Sequence[Row], n_code: int) -> pyarrow.Table:
         for name in (*LIGHT, "thumbnail", "shape")
         if name not in _CODED
     }
+    columns["name"] = [as_text(row.name) for row in rows]
     columns["copies"] = [list(row.copies) for row in rows]
     columns["metadata"] = [sorted(row.metadata.items()) for row in rows]
     columns["report"] = [json.dumps(dict(row.report)) for row in rows]

@@ -16,7 +16,7 @@ from spem.errors import ModelError, ParameterError, ReadError
 from spem.index import models
 from spem.index.database_errors import told
 from spem.index.extra import require
-from spem.index.filters import literal, to_sql
+from spem.index.filters import as_text, literal, to_sql
 from spem.index.locking import one_writer
 from spem.index.row import Row
 from spem.index.schema import LAYOUT, LIGHT, layout_of, models_schema, schema, to_row
@@ -269,8 +269,8 @@ class Store:
     def stored(self, path: str) -> str:
         """Return a path as the table has it: from the folder of the index, absolute on object storage."""
         if self.folder is not None:
-            return stored_path(path, self.folder)
-        return str(Path(path).absolute()) if Path(path).exists() else path
+            return as_text(stored_path(path, self.folder))
+        return as_text(str(Path(path).absolute()) if Path(path).exists() else path)
 
     def write(self, rows: Sequence[Row], model: Model) -> None:
         """Write rows in one step; see `spem.index.updates.write`."""
