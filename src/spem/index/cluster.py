@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import platform
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -27,8 +28,8 @@ R = TypeVar("R")
 
 # Seconds within which a scheduler must answer, and for which one may have no worker.
 CONNECT, IDLE = 5.0, 60.0
-# Tasks handed out for each thread: one runs, the next is there when it is done.
-_AHEAD = 2
+# Tasks handed out for each thread: one runs, others are there while rows are written.
+_AHEAD = 4
 # Seconds between two looks at the cluster while nothing comes.
 _LOOK = 1.0
 
@@ -107,11 +108,13 @@ class _Run:
         """Yield each task with its outcome, None where its workers died; few are on their way at a time."""
         left = iter(tasks)
         pending: dict[Any, Any] = {}
-        more, since = True, time.monotonic()
+        more, since, looked, n_threads = True, time.monotonic(), -math.inf, 0
         try:
             while more or pending:
-                n_threads = self._n_threads()
-                since = time.monotonic() if n_threads else since
+                now = time.monotonic()
+                if now - looked >= _LOOK:
+                    n_threads, looked = self._n_threads(), now
+                since = now if n_threads else since
                 while more and len(pending) < (1 if alone else max(2, _AHEAD * n_threads)):
                     task = next(left, _END)
                     more = task is not _END
@@ -119,7 +122,7 @@ class _Run:
                         pending[self._submit(task)] = task
                 for future in self._finished():
                     yield pending.pop(future), self._outcome(future)
-                if time.monotonic() - since > self.idle:
+                if now - since > self.idle:
                     msg = f"{self.address}: no worker for {self.idle:g} s; start some, give the command again"
                     raise ClusterError(msg)
         finally:
