@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         wave_kernel_signature,
     )
     from spem.errors import (
+        ClusterError,
         ConvergenceError,
         LabelError,
         ModelError,
@@ -75,6 +76,7 @@ if TYPE_CHECKING:
     from spem.fields.walks.killed import Walk, killed_walk
     from spem.fields.walks.paths import sample_paths
     from spem.fields.walks.transient import Transient, solve_transient
+    from spem.index.adding import Added
     from spem.index.answers import Answers
     from spem.index.index import Index
     from spem.retrieval.classification import Classification, linear_svm
@@ -93,11 +95,13 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three lists
+    "Added",
     "Answer",
     "Answers",
     "BlockLanczos",
     "BoundaryResponse",
     "Classification",
+    "ClusterError",
     "Clusters",
     "Codes",
     "ConjugateGradient",
@@ -219,11 +223,13 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
 
 # Public name -> module that defines it; each is imported when it is first used.
 _HOME = {
+    "Added": "spem.index.adding",
     "Answer": "spem.retrieval.ranking",
     "Answers": "spem.index.answers",
     "BlockLanczos": "spem.fields.solvers.lanczos",
     "BoundaryResponse": "spem.embedding.boundary_response",
     "Classification": "spem.retrieval.classification",
+    "ClusterError": "spem.errors",
     "Clusters": "spem.decomposition.clusters",
     "Codes": "spem.codes.codes",
     "ConjugateGradient": "spem.fields.solvers.cg",
