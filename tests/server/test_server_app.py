@@ -275,6 +275,19 @@ def test_encode_gives_the_code_of_the_model(client, index, tmp_path):
     assert np.allclose(job["result"]["code"], expected, atol=1e-6)
 
 
+def test_files_of_one_name_are_two_shapes(client, index):
+    """Two uploads of one name do not push each other out, and stand for no file of the host."""
+    made = []
+    for width in (26, 30):
+        answer = client.post("/api/shapes", files={"file": ("same.png", picture(width))}, headers=WRITING)
+        made.append(finished(client, answer)["result"]["shape"])
+    assert made[0]["id"] != made[1]["id"]
+    assert {shape["file"] for shape in made} == {"same.png"}
+    assert all(index.get(shape["id"]).path.startswith("upload:") for shape in made)
+    for shape in made:
+        assert client.delete(f"/api/shapes/{shape['id']}", headers=WRITING).json() == {"removed": 1}
+
+
 def test_add_and_remove_with_the_token(client):
     """A shape is added with its label and metadata, found, and removed again."""
     form = {"name": "plate", "label": "new", "metadata": json.dumps({"year": 2001})}
