@@ -17,7 +17,6 @@ from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.codes.sources import Source, as_source, find_files, source_path
 from spem.codes.traits import kinds_of
-from spem.codes.work import clear_work
 from spem.errors import ModelError, ParameterError, ReadError
 from spem.index.batches import Batches
 from spem.index.changes import Known, Plan, place, plan
@@ -123,7 +122,7 @@ def add_sources(
             )
         except ReadError as error:
             if error.failures:
-                clear_work(root)
+                drafts.clear(listing.first)
             raise
     store.save_model(model)
     sources = [(source, key) for source, key in listing if key is not None]
@@ -133,7 +132,7 @@ def add_sources(
     relocate(store, model.digest, todo)
     if manner.labels or manner.metadata:
         _annotate(store, listing, todo, model, manner)
-    clear_work(root)
+    drafts.clear(listing.first)
     return replace(_summary(listing, todo, model), gone=n_gone)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -29,7 +29,7 @@ from spem.index.row import Row
 Progress = Callable[[str, int, int], None]
 
 _KIND = "drafts"
-# `spem.codes.work.clear_work` takes what ends so.
+# `spem.codes.work.clear_work` takes what ends so too.
 _SUFFIX = ".drafts.work"
 _TEXT = ("id", "hash", "name", "path", "ndim", "n_nodes", "volume", "report")
 _BYTES = ("thumbnail", "shape")
@@ -60,6 +60,8 @@ class Drafts:
 
     def save(self, key: str, drafts: Sequence[Draft]) -> None:
         """Write the drafts of a source, in one step."""
+        # another process may have found the folder empty and taken it away
+        self.folder.mkdir(parents=True, exist_ok=True)
         header: list[dict[str, Any]] = []
         arrays: dict[str, NDArray[Any]] = {}
         for i, each in enumerate(drafts):
@@ -92,6 +94,15 @@ class Drafts:
     def has(self, key: str) -> bool:
         """Tell whether a source is done."""
         return self._file(key).is_file()
+
+    def clear(self, keys: Iterable[str]) -> None:
+        """Delete the drafts of sources, and folders that are empty then; those of others stay."""
+        for key in keys:
+            self._file(key).unlink(missing_ok=True)
+        for folder in (self.folder, self.folder.parent):
+            # It holds something else, or is gone.
+            with suppress(OSError):
+                folder.rmdir()
 
     def _file(self, key: str) -> Path:
         """Return the file of a source."""
