@@ -23,7 +23,7 @@ _UNKNOWN = "unknown"
 # These stay quick under load, and are asked by machines that must not be turned away.
 _UNLIMITED = ("/health", "/ready", "/metrics")
 _LONGEST_ADDRESS = 8192
-_CLOSED, _TOO_LARGE = 499, 413
+_CLOSED, _REFUSED = 499, 400
 _SWALLOW_SECONDS = 20.0
 
 
@@ -48,7 +48,7 @@ class Doorkeeper:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        reply = _Reply(send, receive, head=scope["method"] == "HEAD")
+        reply = _Reply(scope, receive, send)
         client = client_of(scope, self._services.options.proxies)
         method = scope["method"]
         self._services.metrics.begin()
@@ -83,7 +83,7 @@ class Doorkeeper:
             raise too_large(limit)
         if scope["method"] == "HEAD":
             scope["method"] = "GET"
-        await self._app(scope, counted(receive, limit), reply)
+        await self._app(scope, counted(reply.receive, limit), reply)
 
     def _write_down(self, scope: Scope, reply: _Reply, client: str, method: str) -> None:
         """Count a request and write its line."""
@@ -106,8 +106,10 @@ class Doorkeeper:
 class _Reply:
     """A `send` that adds the headers of every answer, and knows what was sent."""
 
-    def __init__(self, send: Send, receive: Receive, *, head: bool) -> None:
-        self._send, self._receive, self._head = send, receive, head
+    def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        self._send, self._receive, self._head = send, receive, scope["method"] == "HEAD"
+        names = {name for name, _ in scope["headers"]}
+        self._body_left = bool(names & {b"content-length", b"transfer-encoding"})
         self.begun = time.perf_counter()
         self.id = secrets.token_hex(6)
         self.status, self.n_bytes, self.started = 0, 0, False
@@ -124,19 +126,24 @@ class _Reply:
             self.n_bytes += len(message.get("body", b""))
             if self._head:
                 message["body"] = b""
-            if self.status == _TOO_LARGE and not message.get("more_body"):
+            if self.status >= _REFUSED and self._body_left and not message.get("more_body"):
                 await self._send({**message, "more_body": True})
                 await self._swallow()
                 message = {"type": message["type"], "body": b""}
         await self._send(message)
 
+    async def receive(self) -> Message:
+        """Receive a message, and notice the end of the body."""
+        message = await self._receive()
+        self._body_left = self._body_left and bool(message.get("more_body"))
+        return message
+
     async def _swallow(self) -> None:
         """Read what a client still sends, for a while: it reads the answer only when it has sent all."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_SWALLOW_SECONDS):
-                message: Message = {"more_body": True}
-                while message.get("more_body"):
-                    message = await self._receive()
+                while self._body_left:
+                    await self.receive()
 
 
 async def _finish(response: Any, scope: Scope, receive: Receive, reply: _Reply) -> None:
