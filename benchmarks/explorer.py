@@ -28,7 +28,7 @@ from _table import Benchmark, Row
 FIRST_PAGE, SLIDER = 2.0, 0.1
 SCRIPTS = ("theme", "app", "api", "dom", "router", "gallery", "cards", "upload")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic")
+ARGUMENTS = ("--no-sandbox", "--disable-gpu", "--disable-quic")
 PICTURES = "[...document.querySelectorAll('.grid img')].slice(0, 12).every((one) => one.complete)"
 SETTLED = (
     "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"
