@@ -21,6 +21,8 @@ from spem.plots.thumbnails import thumbnail
 from spem.shapes.shape import Shape
 
 _THUMBNAIL_DIMENSIONS = 3
+# As large as the cards of a gallery show them; the time grows with the area.
+_THUMBNAIL_PIXELS = 128
 _NO_CODE = np.empty(0, np.float32)
 
 
@@ -230,6 +232,6 @@ def _bare_row(shape: Shape, key: str, suffix: str, name: str, path: str, *, keep
         n_nodes=shape.n_nodes,
         volume=shape.volume,
         report=asdict(shape.report),
-        thumbnail=thumbnail(shape) if shape.ndim <= _THUMBNAIL_DIMENSIONS else b"",
+        thumbnail=thumbnail(shape, _THUMBNAIL_PIXELS) if shape.ndim <= _THUMBNAIL_DIMENSIONS else b"",
         shape=pack(shape) if keep_shape else b"",
     )
