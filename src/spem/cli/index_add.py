@@ -37,6 +37,9 @@ def add(
         str | None,
         typer.Option(metavar="CODES|DIGEST", help="Model of a file, or which one of the index."),
     ] = None,
+    new_model: Annotated[
+        bool, typer.Option("--new-model", help="Learn another model from SHAPES, beside those of DB.")
+    ] = False,
     prune: Annotated[
         bool, typer.Option("--prune", help="Drop shapes whose files are no longer in SHAPES.")
     ] = False,
@@ -75,6 +78,7 @@ def add(
       spem index add shapes.db shapes/
       spem index add shapes.db shapes/ --labels shapes/labels.csv --meta site=Oslo
       spem index add shapes.db shapes/ --prune                   follows a folder
+      spem index add shapes.db solids/ --new-model               solids beside silhouettes
       spem index add s3://bucket/shapes scans/ --cluster tcp://head:8786
     """  # noqa: D301
     from spem.codes.settings import Settings
@@ -96,6 +100,7 @@ def add(
             added = index.add(
                 list(paths),
                 model=_model(model),
+                new_model=new_model,
                 settings=settings,
                 labels=labels,
                 metadata=metadata,

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from spem.codes.codes import Codes, Failure
 from spem.codes.model import Model
 from spem.codes.settings import Settings
+from spem.errors import ParameterError
 from spem.index.adding import Added, Manner, Progress, add_sources, agreed_settings
 from spem.index.answers import Answers
+from spem.index.choosing import models_for
 from spem.index.cluster import ClusterExecutor
 from spem.index.duplicates import DISTANCE, Duplicates, find_duplicates
 from spem.index.executors import LocalExecutor
@@ -90,6 +92,7 @@ class Index(Records):
         sources: str | Path | Shape | Sequence[str | Path | Shape],
         *,
         model: Model | str | None = None,
+        new_model: bool = False,
         settings: Settings | None = None,
         labels: str | Path | Mapping[str, str] | None = None,
         metadata: Mapping[str, str] | None = None,
@@ -114,8 +117,10 @@ class Index(Records):
             Files, folders, patterns and shapes.
         model
             What codes are made with, or its digest where the index has several.
+        new_model
+            Whether another model is learnt from these sources, beside those that the index has.
         settings
-            How files become codes, of a new index.
+            How files become codes, where a model is learnt.
         labels
             File with labels, or file → label.
         metadata
@@ -146,7 +151,10 @@ class Index(Records):
             When there is no source, or nothing could be done.
         """
         given = [sources] if isinstance(sources, (str, Path, Shape)) else list(sources)
-        if isinstance(model, str) or (model is None and self.store.digests()):
+        if new_model and model is not None:
+            msg = "new_model: a model was given too; leave one of them out"
+            raise ParameterError(msg)
+        if isinstance(model, str) or (model is None and self.store.digests() and not new_model):
             model = self.model(model)
         local = LocalExecutor(n_jobs)
         manner = Manner(
@@ -186,7 +194,8 @@ class Index(Records):
         where
             Filter of the answers, as `rows` takes it.
         model
-            Digest, where the index has several models.
+            Digest, where several models of the index can answer: a file or shape is asked of that of its
+            dimension, what the index has of that which holds it.
         exact
             Whether all codes are compared, or the approximate index of `optimize` is asked; None compares all
             up to 100,000, and beyond them too where there is no such index.
@@ -206,8 +215,13 @@ class Index(Records):
         """
         wanted = Search(k, where, exact, rerank, volume_within)
         known = isinstance(model, str) and self.snapshots.knows(model)
-        digest = str(model) if known else self.digest(model)
+        digest = str(model) if known else self.digest(self._model_for(query) if model is None else model)
         return search(self.store, self.snapshots, digest, query, wanted)
+
+    def _model_for(self, query: Any) -> str | None:
+        """Return the one model of several that can answer a query, if there is one."""
+        fitting = models_for(query, self.store, self.models()) if len(self.store.digests()) > 1 else []
+        return fitting[0] if len(fitting) == 1 else None
 
     def duplicates(
         self,
