@@ -22,7 +22,7 @@ FOLDER = Path(__file__).parent / "images"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = ("--no-sandbox", "--disable-background-networking", "--use-angle=swiftshader")
 KINDS = ("dog", "elephant", "giraffe", "lizard", "octopus")
-SIZE = {"width": 1280, "height": 1180}
+SIZE = {"width": 1280, "height": 1105}
 START = 60.0
 
 

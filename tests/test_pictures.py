@@ -18,7 +18,9 @@ def test_pictures_of_the_readme_are_drawn(tmp_path):
     pictures = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(pictures)
     pictures.main(tmp_path / "images", share=0.1)
-    shown = re.findall(r"\(docs/images/([\w-]+\.png)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
-    assert shown
+    every = re.findall(r"\(docs/images/([\w-]+\.png)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    # that of the explorer is taken in a browser, by docs/screenshot.py
+    shown = [name for name in every if name != "explorer.png"]
+    assert 0 < len(shown) == len(every) - 1
     assert sorted(path.name for path in (tmp_path / "images").iterdir()) == sorted(shown)
     assert all(np.ptp(imread(tmp_path / "images" / name)) > 0.5 for name in shown)
