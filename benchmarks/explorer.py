@@ -48,7 +48,7 @@ PAINT = """async () => {
 
 def main(argv: list[str] | None = None) -> None:
     benchmark = Benchmark("explorer", str(__doc__).splitlines()[0], argv)
-    if importlib.util.find_spec("plotly") and importlib.util.find_spec("fastapi"):
+    if importlib.util.find_spec("fastapi"):
         sent(benchmark)
     else:
         benchmark.skip("no server: pip install 'spem[server]'")

@@ -87,7 +87,7 @@ def test_real_shapes_are_skipped_without_data(name, tmp_path):
     assert result["skipped"]
 
 
-@pytest.mark.skipif(importlib.util.find_spec("plotly") is None, reason="plotly is not installed")
+@pytest.mark.skipif(importlib.util.find_spec("fastapi") is None, reason="fastapi is not installed")
 def test_explorer_without_a_browser(tmp_path):
     """Without a browser it is told what the first page loads, and that the rest was not run."""
     result = _run("explorer", tmp_path, PATH="", SPEM_BROWSER="")

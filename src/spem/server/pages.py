@@ -7,27 +7,13 @@ import hashlib
 import html
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib import metadata, resources
+from importlib import resources
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Request, Response
 
-from spem.errors import MissingExtraError
+from spem.server.security import PAGE_POLICY
 
-#: What the pages may load and do; Plotly writes styles of its own.
-CONTENT_SECURITY_POLICY = "; ".join(
-    (
-        "default-src 'none'",
-        "script-src 'self'",
-        "style-src 'self' 'unsafe-inline'",
-        "img-src 'self' data: blob:",
-        "connect-src 'self'",
-        "base-uri 'self'",
-        "form-action 'none'",
-        "frame-ancestors 'none'",
-    )
-)
-PLOTLY = "plotly.min.js"
 _TYPES = {
     ".js": "text/javascript; charset=utf-8",
     ".css": "text/css; charset=utf-8",
@@ -78,14 +64,12 @@ class Asset:
 
 @dataclass(frozen=True, eq=False)
 class Assets:
-    """The files of the explorer: those of the package and Plotly's script, no other ones.
+    """The files of the explorer: those of the package, no other ones.
 
     Parameters
     ----------
     files
         Content by name, all that may be asked for.
-    plotly_version
-        Version of Plotly, whose script is read when it is first asked for.
 
     Examples
     --------
@@ -94,49 +78,32 @@ class Assets:
     """
 
     files: dict[str, Asset]
-    plotly_version: str
     _documents: dict[str, Asset] = field(default_factory=dict, repr=False)
 
     @classmethod
     def load(cls) -> Assets:
-        """Read the files of the package.
-
-        Raises
-        ------
-        MissingExtraError
-            When Plotly is not installed.
-        """
+        """Read the files of the package."""
         folder = resources.files("spem.server") / "static"
         found = {entry.name: entry for entry in folder.iterdir() if entry.is_file()}
-        files = {
-            name: Asset(found[name].read_bytes(), _TYPES[suffix])
-            for name in sorted(found)
-            if (suffix := "." + name.rpartition(".")[2]) in _TYPES
-        }
-        try:
-            plotly_version = metadata.version("plotly")
-        except metadata.PackageNotFoundError as error:
-            msg = "the explorer needs plotly, which is not installed: pip install 'spem[server]'"
-            raise MissingExtraError(msg) from error
-        return cls(files, plotly_version)
+        return cls(
+            {
+                name: Asset(found[name].read_bytes(), _TYPES[suffix])
+                for name in sorted(found)
+                if (suffix := "." + name.rpartition(".")[2]) in _TYPES
+            }
+        )
 
     @cached_property
     def version(self) -> str:
         """Digest of all files; part of their addresses, so that they may be kept for ever."""
-        digest = hashlib.sha256(self.plotly_version.encode())
+        digest = hashlib.sha256()
         for name, asset in self.files.items():
             digest.update(name.encode() + asset.content)
         return digest.hexdigest()[:12]
 
-    @cached_property
-    def plotly(self) -> Asset:
-        """Plotly's script, from its package."""
-        script = resources.files("plotly") / "package_data" / PLOTLY
-        return Asset(script.read_bytes(), _TYPES[".js"])
-
     def find(self, name: str) -> Asset | None:
         """Return a file by its name, or None where there is none to serve."""
-        return self.plotly if name == PLOTLY else self.files.get(name)
+        return self.files.get(name)
 
     def document(self, root_path: str) -> Asset:
         """Return the one document of all pages, for a server under this path."""
@@ -166,7 +133,7 @@ def page_routes(assets: Assets | None = None) -> APIRouter:
     ) -> Response:
         document = served.document(str(request.scope.get("root_path", "")))
         response = document.respond(_ASK_AGAIN, if_none_match, accept_encoding)
-        response.headers["Content-Security-Policy"] = CONTENT_SECURITY_POLICY
+        response.headers["Content-Security-Policy"] = PAGE_POLICY
         return response
 
     for path in ("/", "/map", "/shape/{row_id}"):
