@@ -58,7 +58,7 @@ class Explored:
 @pytest.fixture(scope="session")
 def explored(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Explored]:
     """Return a server on twelve silhouettes and three solids, each with a model of its own."""
-    for package in ("lancedb", "fastapi", "uvicorn", "plotly", "prometheus_client"):
+    for package in ("lancedb", "fastapi", "uvicorn", "prometheus_client"):
         pytest.importorskip(package, reason=f"the server needs {package}: pip install 'spem[server]'")
     folder = tmp_path_factory.mktemp("explored")
     flat, solid = _collection(folder)
@@ -108,9 +108,10 @@ def _address(process: subprocess.Popen[str], log: Path) -> str:
     raise AssertionError(log.read_text())
 
 
-@pytest.fixture(scope="session")
+# Playwright keeps an event loop running in this thread: later modules need one of their own.
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    """Return a Chromium that is started once."""
+    """Return a Chromium that is started once in a module."""
     playwright = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install playwright")
     found = os.environ.get("SPEM_BROWSER") or next(filter(None, map(shutil.which, _BROWSERS)), None)
     if found is None:

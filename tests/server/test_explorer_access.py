@@ -133,3 +133,25 @@ def test_policy_lets_nothing_foreign_in(tabs):
     )
     assert page.evaluate("window.ran") is None
     tabs.allowed = ("Content Security Policy",)
+
+
+def test_page_that_was_left_changes_nothing(tabs):
+    """What a page was waiting for is dropped when it is left: the title stays that of the one shown."""
+    page = tabs.open()
+    held = []
+    page.route("**/api/shapes/*", lambda route: held.append(route))
+    page.locator("a.card").first.click()
+    expect(page.locator(".page-shape")).to_be_attached()
+    page.get_by_role("link", name="Map", exact=True).click()
+    expect(page).to_have_title("Map · spem")
+    with page.expect_response("**/api/shapes/*"):
+        held[0].continue_()
+    page.wait_for_timeout(200)
+    expect(page).to_have_title("Map · spem")
+    expect(page).to_have_url(tabs.address + "map")
+
+
+def test_address_that_is_no_text_leads_nowhere(tabs):
+    """A path whose escapes are no text is told to lead nowhere, as any other one."""
+    page = tabs.open("shape/%E0%A4%A")
+    expect(page.get_by_role("heading", name="No such page")).to_be_visible()

@@ -126,6 +126,36 @@ def test_similar_shapes_are_compared_side_by_side(tabs, explored):
     expect(page).not_to_have_url(re.compile("compare"))
 
 
+def test_back_from_a_file_leads_to_the_answers_of_the_shape_before(tabs, explored, drop):
+    """Answers are those of the address, also where a file was searched for in between."""
+    page = tabs.open("?q=dog_01")
+    key = page.locator("a.card").first.get_attribute("href").rsplit("/", 1)[-1].partition("?")[0]
+    page.goto(f"?like={key}")
+    expect(page.get_by_role("heading", level=1)).to_have_text("dog_01")
+    drop(page, explored.folder / "images" / "hand_02.png")
+    expect(page.get_by_role("heading", level=1)).to_have_text("hand_02")
+    page.go_back()
+    expect(page.get_by_role("heading", level=1)).to_have_text("dog_01")
+    expect(page.locator(".answer")).to_have_count(11)
+
+
+def test_late_answers_do_not_take_the_place_of_new_ones(tabs):
+    """Of two filters chosen in a row the second one stays, even where the answer to the first comes later."""
+    page = tabs.open("?q=dog_01")
+    key = page.locator("a.card").first.get_attribute("href").rsplit("/", 1)[-1].partition("?")[0]
+    page.goto(f"?like={key}")
+    expect(page.locator(".answer")).to_have_count(11)
+    late = []
+    page.route("**/neighbours?*label=hand*", lambda route: late.append(route))
+    page.get_by_label("Label").select_option("hand")
+    page.get_by_label("Label").select_option("fish")
+    expect(page.locator(".answer")).to_have_count(4)
+    assert len(late) == 1
+    late[0].continue_()
+    page.wait_for_timeout(300)
+    assert {name[:4] for name in page.locator(".answer .name").all_inner_texts()} == {"fish"}
+
+
 def test_answers_are_kept_as_csv(tabs, tmp_path):
     """The table of answers has what is shown, and opens nothing as a formula."""
     page = tabs.open("about:blank")

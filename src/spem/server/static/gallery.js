@@ -38,6 +38,7 @@ class Gallery {
 
   toolbar(state) {
     const change = (changes) => {
+      if (!this.root.isConnected) return;
       this.setState(changes);
       this.load({ ...this.state, ...changes }, 0);
     };
@@ -50,7 +51,7 @@ class Gallery {
         if (event.key === "ArrowDown") this.grid.querySelector("a")?.focus();
         if (event.key === "Escape" && this.q.value) {
           this.q.value = "";
-          change({ q: null });
+          typed("");
         }
       },
     });

@@ -68,12 +68,21 @@ function matched() {
   for (const { pattern, name, open, when } of routes) {
     const match = pattern.exec(path);
     if (match && when(state)) {
-      const parameters = {};
-      for (const [key, value] of Object.entries(match.groups ?? {})) parameters[key] = decodeURIComponent(value);
+      const parameters = decoded(match.groups ?? {});
+      if (!parameters) break;
       return { name, open, parameters, key: `${name} ${path} ${state.model ?? ""}` };
     }
   }
   return { name: "absent", open: absent, parameters: {}, key: path };
+}
+
+/** Parts of a path as text; null where they are none. */
+function decoded(groups) {
+  try {
+    return Object.fromEntries(Object.entries(groups).map(([key, value]) => [key, decodeURIComponent(value)]));
+  } catch {
+    return null;
+  }
 }
 
 function absent() {

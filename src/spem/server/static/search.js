@@ -37,6 +37,8 @@ class Answers {
   async begin(state) {
     this.state = state;
     this.asked = state.job ? `job ${state.job}` : `like ${state.like}`;
+    this.closeComparison?.();
+    this.id = this.found = this.closeComparison = null;
     document.title = "Nearest shapes · spem";
     this.head = element("div", { class: "query" });
     this.controls = element("div", { class: "toolbar" });
@@ -52,15 +54,23 @@ class Answers {
   update(state) {
     const asked = state.job ? `job ${state.job}` : `like ${state.like}`;
     if (asked !== this.asked) {
-      this.control.abort();
-      this.control = new AbortController();
+      this.renew();
       this.begin(state);
       return;
     }
     const changed = ["k", "label"].some((key) => (this.state[key] ?? "") !== (state[key] ?? ""));
     this.state = state;
-    if (changed) this.ask().catch((error) => this.fail(error));
-    else this.compare();
+    if (!changed) this.compare();
+    else if (this.id) {
+      this.renew();
+      this.ask().catch((error) => this.fail(error));
+    }
+  }
+
+  /** Give up what was asked before, so that no late answer takes the place of a new one. */
+  renew() {
+    this.control.abort();
+    this.control = new AbortController();
   }
 
   async wait(job) {

@@ -19,16 +19,18 @@ export class Beside {
     this.destroy();
     this.other = other;
     this.root.hidden = other === null;
-    this.body.replaceChildren(element("p", { class: "shape-note", role: "status" }, "Loading both shapes…"));
+    // A place of its own for each, so that one that comes late cannot take that of a later one.
+    const place = element("div", {}, element("p", { class: "shape-note", role: "status" }, "Loading both shapes…"));
+    this.body.replaceChildren(place);
     if (other === null) return;
     try {
       const { compareShapes } = await import("./shape_compare.js");
-      const comparison = await compareShapes(this.body, this.id, other);
-      if (this.other === other) this.comparison = comparison;
-      else comparison.destroy();
+      const comparison = await compareShapes(place, this.id, other);
+      if (!comparison) return;
+      this.comparison = comparison;
       this.root.scrollIntoView({ block: "nearest" });
     } catch (error) {
-      this.body.replaceChildren(element("p", { class: "shape-note" }, error.message));
+      place.replaceChildren(element("p", { class: "shape-note" }, error.message));
     }
   }
 

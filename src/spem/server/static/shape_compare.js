@@ -16,15 +16,17 @@ const WORDS = 4;
 const POINTS = 40;
 const NONE = { header: { words: [] }, arrays: {} };
 
-/** Fill an element with the comparison of two shapes. */
+/** Fill an element with the comparison of two shapes; null where the element is gone before they have come. */
 export async function compareShapes(root, queryId, answerId) {
   const load = async (id) => ({ card: await loadCard(id), ...(await loadPictures(id)) });
-  const comparison = new Comparison([queryId, answerId], await Promise.all([load(queryId), load(answerId)]));
+  const shapes = await Promise.all([load(queryId), load(answerId)]);
+  if (!root.isConnected) return null;
+  const comparison = new Comparison([queryId, answerId], shapes);
   root.replaceChildren(comparison.root);
   root.closest("dialog")?.addEventListener("close", () => comparison.destroy(), { once: true });
   comparison.paint();
   bytes("api/words", { query: queryId, answer: answerId, n: WORDS })
-    .then((body) => comparison.explain(unpackArrays(body)))
+    .then((body) => root.isConnected && comparison.explain(unpackArrays(body)))
     .catch((error) => comparison.explain(NONE, error.message));
   return comparison;
 }

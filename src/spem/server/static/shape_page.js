@@ -20,9 +20,11 @@ export async function renderShape(root, id, state, setState) {
   root.replaceChildren(wait);
   const pictures = loadPictures(id).catch((error) => ({ error }));
   const card = await loadCard(id);
+  if (!root.isConnected) return { update() {} };
   document.title = `${card.name} · spem`;
   root.replaceChildren(element("article", { class: "shape" }, head(card), wait));
   const { error, ...drawn } = await pictures;
+  if (!root.isConnected) return { update() {} };
   if (error) {
     wait.replaceWith(withoutPictures(id, card, error.message));
     return { update() {} };
@@ -156,6 +158,7 @@ class ShapePage {
         this.failure = error.message;
       })
       .finally(() => {
+        if (!this.root.isConnected) return;
         this.figure.removeAttribute("aria-busy");
         if (this.failure) this.caption.textContent = this.failure;
         else this.draw();
