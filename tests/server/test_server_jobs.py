@@ -182,18 +182,31 @@ def test_a_job_that_took_the_server_down_twice_is_given_up(
     """What was running when the server died is tried once more; damaged records are swept away."""
     workers.go.set()
     spool = Spool(tmp_path)
-    for name, attempts in (("aa", 1), ("bb", 2)):
+    once, twice, damaged, odd, left = (digit * 24 for digit in "abcde")
+    for name, attempts in ((once, 1), (twice, 2)):
         spool.save_payload(name, b"file")
         spool.save(Job(name, "encode", HEADER, time.time(), state="running", attempts=attempts))
+    spool.save(Job(odd, "encode", HEADER, None))  # type: ignore[arg-type]
     spool.close()
-    (tmp_path / "cc.json").write_text("{", encoding="utf-8")
-    (tmp_path / "dd.bin").write_bytes(b"left")
+    (tmp_path / f"{damaged}.json").write_text("{", encoding="utf-8")
+    (tmp_path / f"{left}.bin").write_bytes(b"left")
+    (tmp_path / f".{left}.json.01234567").write_bytes(b"half")
     jobs = start()
-    assert over(jobs, "aa")["state"] == "done"
-    assert "given up after 2 attempts" in over(jobs, "bb")["error"]
+    assert over(jobs, once)["state"] == "done"
+    assert "given up after 2 attempts" in over(jobs, twice)["error"]
     jobs.close(5.0)
-    assert {file.stem for file in tmp_path.iterdir() if file.is_file()} == {"aa", "bb", "lock"}
-    assert json.loads((tmp_path / "bb.json").read_bytes())["state"] == "failed"
+    assert {file.stem for file in tmp_path.iterdir() if file.is_file()} == {once, twice, "lock"}
+    assert json.loads((tmp_path / f"{twice}.json").read_bytes())["state"] == "failed"
+
+
+def test_files_that_are_no_jobs_stay(start: Callable[..., Jobs], tmp_path: Path) -> None:
+    """A folder that was given for jobs by mistake keeps what it holds."""
+    theirs = [tmp_path / name for name in ("thesis.tex", "package.json", ".profile", "aa.bin")]
+    for file in theirs:
+        file.write_text("{}", encoding="utf-8")
+    (tmp_path / f"{'f' * 24}.json").mkdir()
+    start()
+    assert all(file.read_text(encoding="utf-8") == "{}" for file in theirs)
 
 
 def test_results_are_kept_for_a_while(start: Callable[..., Jobs], workers: Workers, tmp_path: Path) -> None:

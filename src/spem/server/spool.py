@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import json
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -17,6 +18,9 @@ from spem.files import DAMAGE, write_whole
 from spem.index.row import Row
 from spem.server.arrays import pack_arrays, unpack_arrays
 from spem.server.tasks import pack_rows, unpack_rows
+
+# What jobs are kept under, and under what `write_whole` has them before they are whole.
+_OWN = re.compile(r"[0-9a-f]{24}\.(json|bin|rows)|\.[0-9a-f]{24}\.(json|bin|rows)\.[0-9a-f]{8}")
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 OVER: tuple[State, ...] = ("done", "failed", "cancelled")
@@ -62,6 +66,17 @@ class Job:
     def with_(self, **changes: Any) -> Job:
         """Return the job with changes."""
         return replace(self, **changes)
+
+
+def _job(file: Path) -> Job | None:
+    """Read the record of a job, or None where it is damaged."""
+    try:
+        job = Job(**json.loads(file.read_bytes()))
+        values = (job.submitted, job.started, job.finished, job.progress, job.attempts)
+    except DAMAGE:
+        return None
+    plain = all(isinstance(value, int | float) for value in values) and isinstance(job.header, dict)
+    return job if plain and job.id == file.stem and job.state in ("queued", "running", *OVER) else None
 
 
 class Spool:
@@ -141,18 +156,19 @@ class Spool:
             self._file(job_id, kind).unlink(missing_ok=True)
 
     def load(self) -> list[Job]:
-        """Read all jobs, the oldest first; what is damaged or belongs to none is removed."""
-        jobs = []
-        for file in self.folder.glob("*.json"):
-            try:
-                jobs.append(Job(**json.loads(file.read_bytes())))
-            except DAMAGE:
+        """Read all jobs, the oldest first; their damaged files, and those of none, are removed.
+
+        Files with names that no job has are not touched: the folder may hold what is somebody else's.
+        """
+        own = [file for file in self.folder.iterdir() if _OWN.fullmatch(file.name) and file.is_file()]
+        jobs = {}
+        for file in own:
+            if file.suffix == ".json" and (job := _job(file)) is not None:
+                jobs[job.id] = job
+        for file in own:
+            if file.name.startswith(".") or file.stem not in jobs:
                 file.unlink(missing_ok=True)
-        known = {job.id for job in jobs}
-        for file in self.folder.iterdir():
-            if file.is_file() and file.name != "lock" and file.stem not in known:
-                file.unlink(missing_ok=True)
-        return sorted(jobs, key=lambda job: job.submitted)
+        return sorted(jobs.values(), key=lambda job: job.submitted)
 
     def model_file(self, digest: str, load: Callable[[str], Model]) -> Path:
         """Return the file of a model, written when it is first asked for, where workers can read it."""
