@@ -348,6 +348,25 @@ def test_damaged_file_fails_its_job(client):
     assert job["error"].startswith("bad.png")
 
 
+@pytest.mark.parametrize("charset", ["undefined", "punycode", "unicode_escape", "no-such", '"'])
+def test_forms_are_in_utf_8(client, charset):
+    """No codec is chosen by a client: some of them fail on any text."""
+    body = b'--x\r\nContent-Disposition: form-data; name="file"; filename="a.png"\r\n\r\nx\r\n--x--\r\n'
+    kind = f"multipart/form-data; boundary=x; charset={charset}"
+    answer = client.post("/api/search", content=body, headers={"Content-Type": kind})
+    assert answer.status_code == 415
+    assert "UTF-8" in answer.json()["error"]
+
+
+@pytest.mark.parametrize("told", [r'{"a": "\ud800"}', r'{"\u0000": "b"}', '{"": "b"}', r'{"a": "b\nc"}'])
+def test_metadata_is_plain_text(client, told):
+    """Metadata that cannot be stored, or shown on a line, is refused before there is a job."""
+    form = {"files": {"file": ("a.png", b"x")}, "data": {"metadata": told}}
+    answer = client.post("/api/shapes", headers=WRITING, **form)
+    assert answer.status_code == 422
+    assert "metadata" in answer.json()["error"]
+
+
 @pytest.mark.parametrize(
     ("headers", "size", "status"),
     [(WRITING, 8 << 20, 413), ({}, 90_000, 401), ({"Origin": "http://evil"}, 8 << 20, 403)],
@@ -360,9 +379,10 @@ def test_refusals_reach_who_sends_much(client, headers, size, status):
 
 def test_bodies_are_counted_while_they_come(client):
     """A body of unknown length is cut off at the limit."""
+    head = b'--x\r\nContent-Disposition: form-data; name="file"; filename="a.png"\r\n\r\n'
     answer = client.post(
         "/api/search",
-        content=iter([b"--x\r\n", *([bytes(65_536)] * 4)]),
+        content=iter([head, *([bytes(65_536)] * 4)]),
         headers={"Content-Type": "multipart/form-data; boundary=x"},
     )
     assert answer.status_code == 413

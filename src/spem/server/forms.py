@@ -7,6 +7,7 @@ import json
 from dataclasses import dataclass
 
 from fastapi import Request
+from python_multipart.multipart import parse_options_header
 from starlette.datastructures import UploadFile
 
 from spem.errors import ReadError
@@ -20,6 +21,7 @@ _FIELDS = 8
 _FIELD_BYTES = 16 << 10
 _SECONDS = 300.0
 _MOST_METADATA = 64
+_CHARSETS = (b"utf-8", b"utf8", b"us-ascii")
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class Form:
         return text
 
     def metadata(self) -> dict[str, str]:
-        """Return the field ``metadata``: a JSON object of texts and numbers.
+        """Return the field ``metadata``: a JSON object of numbers and texts of one line.
 
         Raises
         ------
@@ -87,7 +89,10 @@ class Form:
         )
         if not plain or len(values) > _MOST_METADATA:
             raise Refusal(422, expected)
-        return {key: str(value) for key, value in values.items()}
+        told = {key: str(value) for key, value in values.items()}
+        if not all(key and (key + value).isprintable() for key, value in told.items()):
+            raise Refusal(422, "metadata: a key is empty, or a text has control characters; leave them out")
+        return told
 
 
 class Forms:
@@ -122,6 +127,10 @@ async def _received(request: Request) -> Form:
     """Read a form."""
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise Refusal(415, "expected a form (multipart/form-data) with a part named file")
+    charset = parse_options_header(request.headers["content-type"])[1].get(b"charset", b"utf-8")
+    if charset.lower() not in _CHARSETS:
+        # any codec of Python would be taken by its name
+        raise Refusal(415, "expected a form in UTF-8; leave its charset out")
     async with request.form(max_files=1, max_fields=_FIELDS, max_part_size=_FIELD_BYTES) as form:
         file = form.get("file")
         if not isinstance(file, UploadFile) or not file.filename:
