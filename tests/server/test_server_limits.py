@@ -23,8 +23,8 @@ class Clock:
         return self.now
 
 
-def scope(address: str, forwarded: str = "") -> dict:
-    headers = [(b"x-forwarded-for", forwarded.encode())] if forwarded else []
+def scope(address: str, *forwarded: str) -> dict:
+    headers = [(b"x-forwarded-for", line.encode()) for line in forwarded]
     return {"client": (address, 1), "headers": headers}
 
 
@@ -92,3 +92,8 @@ def test_bodies_are_counted():
             await some()
 
     asyncio.run(run())
+
+
+def test_a_line_that_a_proxy_adds_counts():
+    """What a client claims in a line of its own does not hide the line that the proxy adds after it."""
+    assert client_of(scope("10.0.0.1", "1.1.1.1", "9.9.9.9"), ("10.0.0.1",)) == "9.9.9.9"

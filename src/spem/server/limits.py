@@ -69,7 +69,8 @@ def client_of(scope: Scope, proxies: Sequence[str]) -> str:
     """
     address = (scope.get("client") or ("unknown", 0))[0]
     if address in proxies:
-        told = next((value for name, value in scope["headers"] if name == b"x-forwarded-for"), b"")
+        # a proxy may add a line of its own after those of the client: all of them count, as one
+        told = b",".join(value for name, value in scope["headers"] if name == b"x-forwarded-for")
         steps = [step.strip() for step in told.decode("latin-1").split(",") if step.strip()]
         address = next((step for step in reversed(steps) if step not in proxies), address)
     if ":" not in address:
