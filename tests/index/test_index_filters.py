@@ -68,3 +68,16 @@ def test_any_of_nothing_is_false(filled: Index) -> None:
     """A choice among no values lets no row through."""
     assert filled.rows(any_of("id", [])) == []
     assert filled.count(any_of("label", ["cats", "it's"])) == 2
+
+
+def test_refusals_are_short(filled: Index) -> None:
+    """Of a filter of many characters the refusal repeats the first."""
+    with pytest.raises(ParameterError, match="no filter of rows") as refused:
+        filled.rows("(" * 20_000)
+    assert len(str(refused.value)) < 600
+
+
+def test_text_that_is_no_unicode_is_no_damage(filled: Index) -> None:
+    """Half a character, which no database keeps, is told as such."""
+    with pytest.raises(ParameterError, match="no Unicode"):
+        filled.annotate(where="true", metadata={"a": "\ud800"})

@@ -99,8 +99,11 @@ def _ours(error: BaseException, address: str, *, writing: bool, where: str | Non
         said = next((found[1] for pattern in _REASONS if (found := pattern.search(text))), said)
     is_filter = where is not None and isinstance(error, (ValueError, RuntimeError))
     if is_filter and not far and not _DAMAGE.search(text):
-        msg = f"where={where!r}: no filter of rows ({said}); write SQL such as label = 'cat' AND volume > 2"
+        shown = brief(ValueError(where))
+        msg = f"where={shown!r}: no filter of rows ({said}); write SQL such as label = 'cat' AND volume > 2"
         return ParameterError(msg)
+    if isinstance(error, UnicodeEncodeError):
+        return ParameterError(f"{address}: text that is no Unicode ({said}); leave these characters out")
     if _FULL.search(text):
         return ParameterError(f"{address}: no room left to write; free some and do the same again")
     if _FORBIDDEN.search(text):
