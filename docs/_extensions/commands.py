@@ -29,18 +29,29 @@ def page() -> str:
     """Return the page: the whole, then a section a command."""
     group: Any = typer.main.get_command(spem_app)
     context = group.make_context("spem", [], resilient_parsing=True)
-    parts = ["# Command line", _prose(group.help)]
-    for name, command in group.commands.items():
-        parts += [f"## spem {name}", _usage(command, context, name), _prose(command.help)]
-        parts += _parameters(command, context)
+    parts = ["# Command line", _prose(group.help), *_sections(group, context, "spem", "##")]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def _usage(command: Any, parent: Any, name: str) -> str:
+def _sections(group: Any, parent: Any, words: str, level: str) -> list[str]:
+    """Return a section for each command of a group; those of a group in it are a level below."""
+    parts = []
+    for name, command in group.commands.items():
+        called = f"{words} {name}"
+        parts += [f"{level} {called}", _usage(command, parent, called), _prose(command.help)]
+        if hasattr(command, "commands"):
+            context = type(parent)(command, info_name=name, parent=parent)
+            parts += _sections(command, context, called, level + "#")
+        else:
+            parts += _parameters(command, parent)
+    return parts
+
+
+def _usage(command: Any, parent: Any, called: str) -> str:
     """Return the line of usage as a block."""
-    context = type(parent)(command, info_name=name, parent=parent)
+    context = type(parent)(command, info_name=called, parent=parent)
     pieces = " ".join(command.collect_usage_pieces(context))
-    return f"```text\nspem {name} {pieces}\n```"
+    return f"```text\n{called} {pieces}\n```"
 
 
 def _prose(document: str) -> str:

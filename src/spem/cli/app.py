@@ -104,6 +104,8 @@ def _spem(
       spem parts hand.png -o hand.npz --plot parts.png
       spem encode shapes/ -o shapes.spem          codes of a folder
       spem search shapes.spem query.obj           the most similar shapes
+      spem index add shapes.db shapes/            a collection that is kept up to date
+      spem serve shapes.db --open                 the explorer in the browser
       spem paper fig13 table1 -o out              figures and tables of the paper, made again
 
     Exit status: 0 all done; 1 some shapes failed, the others are saved; 2 wrong usage, or nothing could be
