@@ -19,7 +19,7 @@ from spem.codes.settings import Components, Settings
 from spem.fields.operator import Boundary
 from spem.fields.rho import Scheme
 
-COMMANDS = ("info", "field", "maps", "parts", "encode", "search", "evaluate", "demo")
+COMMANDS = ("info", "field", "maps", "parts", "encode", "search", "evaluate", "demo", "paper", "serve")
 HEAVY = (
     "numba",
     "scipy",
@@ -31,6 +31,11 @@ HEAVY = (
     "nibabel",
     "joblib",
     "tifffile",
+    "lancedb",
+    "pyarrow",
+    "pandas",
+    "fastapi",
+    "distributed",
 )
 
 
