@@ -95,3 +95,33 @@ def test_records_in_memory_and_from_the_database(crowd: Index, monkeypatch: pyte
     found = [[record["name"] for record in one.records(one.positions(ids))] for one in (small, large)]
     assert found[0] == found[1]
     assert large.positions(["nothing", ids[0]]).tolist() == [5]
+
+
+def test_a_model_that_is_added_again_is_read_anew(
+    crowd: Index, ready_row: Callable[..., Row], tiny_model: Model
+) -> None:
+    """Its table counts versions from the start; what was held of the one before is not taken for it."""
+    kept, digest = Snapshots(), crowd.digest()
+    for label in "ab":
+        crowd.annotate(where="volume < 3", label=label)
+    before = _of(kept, crowd, digest)
+    crowd.drop(digest)
+    crowd.store.save_model(tiny_model)
+    write(crowd.store, digest, [ready_row("new")])
+    after = _of(kept, crowd, digest)
+    assert before is not None
+    assert after is not None
+    assert after.pinned.version < before.pinned.version
+    assert [key.decode() for key in after.ids] == [ready_row("new").id]
+
+
+def test_a_model_that_is_dropped_is_let_go_of(
+    crowd: Index, ready_row: Callable[..., Row], tiny_model: Model
+) -> None:
+    """Of a model that is added again at once nothing old is found, whatever versions its table has."""
+    digest, code = crowd.digest(), ready_row("new").code
+    assert len(crowd.search(code, 300, model=digest)) == 300
+    crowd.drop(digest)
+    crowd.store.save_model(tiny_model)
+    write(crowd.store, digest, [ready_row("new")])
+    assert [answer.row.name for answer in crowd.search(code, 300, model=digest)] == ["new"]

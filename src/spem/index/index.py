@@ -223,6 +223,19 @@ class Index(Records):
         fitting = models_for(query, self.store, self.models()) if len(self.store.digests()) > 1 else []
         return fitting[0] if len(fitting) == 1 else None
 
+    def drop(self, model: str | Model) -> int:
+        """Remove a model with all of its rows, and return how many there were.
+
+        Raises
+        ------
+        ModelError
+            When the index has no such model.
+        """
+        digest = self.digest(model)
+        count = super().drop(digest)
+        self.snapshots.forget(digest)
+        return count
+
     def duplicates(
         self,
         distance: float = DISTANCE,

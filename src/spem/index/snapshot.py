@@ -110,12 +110,22 @@ class Snapshots:
         """Tell whether a model has been searched before."""
         return digest in self._pinned
 
+    def forget(self, digest: str) -> None:
+        """Let go of a model that is dropped."""
+        with self._lock:
+            self._held.pop(digest, None)
+            self._pinned.pop(digest, None)
+
     def pinned(self, store: Store, digest: str) -> Pinned:
         """Return the table of a model as it is in the database now."""
         with told(store.address):
             held = self._pinned.get(digest)
             if held is None or held.version != store.table(digest).version:
-                held = self._pinned[digest] = Pinned.newest(store, digest)
+                newest = Pinned.newest(store, digest)
+                if held is not None and newest.version < held.version:
+                    # versions only grow: the model was dropped and has been added again
+                    self._held.pop(digest, None)
+                held = self._pinned[digest] = newest
             return held
 
     def of(self, pinned: Pinned, digest: str) -> Snapshot | None:
