@@ -100,3 +100,15 @@ def test_values_hold_for_a_while():
     assert values.get("a", lambda: 2) == 2
     values.clear()
     assert values.get("c", lambda: 3) == 3
+
+
+def test_what_was_made_before_a_write_is_not_kept_after_it():
+    """A value that was being made while all were forgotten is handed on, and made again when asked for."""
+    values = Remembered(2, 60.0)
+
+    def slow():
+        values.clear()
+        return "old"
+
+    assert values.get("a", slow) == "old"
+    assert values.get("a", lambda: "new") == "new"

@@ -233,3 +233,36 @@ def test_a_folder_has_one_server(start: Callable[..., Jobs], tmp_path: Path) -> 
     (tmp_path / "file").touch()
     with pytest.raises(ParameterError, match="cannot be written"):
         Spool(tmp_path / "file")
+
+
+def test_a_job_cancelled_before_its_step_takes_none(
+    start: Callable[..., Jobs], workers: Workers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is cancelled once the file is encoded is cancelled too, and nothing comes of it."""
+    jobs = start()
+    save_rows = Spool.save_rows
+
+    def cancelled(spool: Spool, job_id: str, rows: list[Row]) -> None:
+        save_rows(spool, job_id, rows)
+        assert jobs.cancel(job_id)
+
+    monkeypatch.setattr(Spool, "save_rows", cancelled)
+    workers.go.set()
+    job = jobs.submit("encode", HEADER, b"file")
+    done = over(jobs, job)
+    assert (done["state"], done["result"]) == ("cancelled", None)
+
+
+def test_a_disk_that_fails_costs_no_thread(
+    start: Callable[..., Jobs], workers: Workers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where a file cannot be removed the job is done all the same, and the next one runs."""
+
+    def fails(*_: object) -> None:
+        raise OSError(5, "Input/output error")
+
+    jobs = start()
+    workers.go.set()
+    monkeypatch.setattr(Spool, "drop_payload", fails)
+    for _ in range(2):
+        assert over(jobs, jobs.submit("encode", HEADER, b"file"))["state"] == "done"

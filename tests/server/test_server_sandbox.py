@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import io
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -19,8 +21,9 @@ from PIL import Image
 
 from spem.codes.collection import encode_collection, encode_file
 from spem.codes.settings import Settings
-from spem.errors import ParameterError, ReadError, SandboxError, SizeError
+from spem.errors import ParameterError, ReadError, SandboxError, SizeError, SpemError
 from spem.index.row import pack
+from spem.server.arrays import pack_arrays
 from spem.server.processes import Process
 from spem.server.sandbox import Sandbox
 from spem.server.tasks import unpack_rows
@@ -28,6 +31,8 @@ from spem.shapes.synthetic import disk
 
 MEMORY = 256 << 20
 PATIENCE = 120.0
+# A number of a descriptor that `select` does not take.
+HIGH = 1100
 
 
 def picture(size: int = 40) -> bytes:
@@ -233,3 +238,64 @@ def test_limits_must_be_positive(limits: dict[str, Any]) -> None:
     """A sandbox without workers, memory or time is refused."""
     with pytest.raises(ParameterError, match="must be positive"):
         Sandbox(**limits)
+
+
+def test_pipes_may_have_any_number(tmp_path: Path) -> None:
+    """Descriptors above 1023, as a server of many connections has them, do for the pipes of a worker."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard < HIGH + 8:
+        pytest.skip(f"this machine allows {hard} open files")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, HIGH + 8), hard))
+    low = [os.pipe() for _ in range(2)]
+    high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, HIGH) for pair in low for end in pair]
+    idle = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, start_new_session=True)
+    worker = Process(idle, requests=high[1], replies=high[2], lifeline=high[0], home=tmp_path / "home")
+    try:
+        os.write(high[3], (4).to_bytes(8, "little") + b"said")
+        assert worker.receive(100, lambda: None) == b"said"
+        worker.send(b"heard", lambda: None)
+        assert os.read(low[0][0], 100)[8:] == b"heard"
+    finally:
+        worker.drop()
+        assert idle.stdin is not None
+        idle.stdin.close()
+        for end in (*low[0], *low[1], high[3]):
+            os.close(end)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_a_worker_that_does_not_start_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the system has no room for a process its pipes are closed and its folder is removed."""
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(subprocess, "Popen", full)
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    with pytest.raises(OSError, match="unavailable"):
+        Process.start(tmp_path, MEMORY)
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        pack_arrays({"state": "stage"}, {}),
+        pack_arrays({"state": "stage", "stage": "x", "share": "much"}, {}),
+        pack_arrays({"state": "done", "header": []}, {}),
+        pack_arrays({"state": "error", "kind": "annotations", "message": "x"}, {}),
+        b"\xff\xff\0\0" + b"[" * 0xFFFF,
+    ],
+)
+def test_a_forged_reply_is_an_error_of_its_task(
+    sandbox: Sandbox, body: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a worker sends that was taken over raises nothing but errors of this library."""
+    workers(sandbox)
+    monkeypatch.setattr(Process, "send", lambda *_: None)
+    monkeypatch.setattr(Process, "receive", lambda *_: body)
+    # no worker is hurt: nothing is sent, so that it may go on
+    monkeypatch.setattr(Sandbox, "_discard", lambda sandbox, worker, _: sandbox._give(worker))
+    with pytest.raises(SpemError, match=r"no reply|cannot be processed|^x$"):
+        sandbox.run("view", {})

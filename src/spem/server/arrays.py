@@ -65,7 +65,7 @@ def unpack_arrays(body: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]
             count = int(np.prod(shape, dtype=np.int64))
             begin = 4 + length + entry["offset"]
             arrays[entry["name"]] = np.frombuffer(body, _TYPES[kind], count, begin).reshape(shape)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         msg = f"not a body of arrays ({error}); expected what pack_arrays makes"
         raise ReadError(msg) from error
     return header, arrays

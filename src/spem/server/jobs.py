@@ -240,12 +240,15 @@ class Jobs:
                 if self._closing:
                     return
                 job = self._begin() if self._next_ready() else None
-            self._sweep()
-            if job is None:
-                continue
-            self._save(job)
             began = time.monotonic()
-            self._run(job)
+            try:
+                self._sweep()
+                if job is None:
+                    continue
+                self._save(job)
+                self._run(job)
+            except Exception:  # noqa: BLE001 a disk that fails must not end the thread
+                _log.exception("jobs")
             self._mean_seconds += 0.2 * (time.monotonic() - began - self._mean_seconds)
 
     def _begin(self) -> Job:
@@ -263,6 +266,7 @@ class Jobs:
             rows = self._encode(job)
             self._progress(job.id, "finishing", 1.0)
             self._spool.save_rows(job.id, rows)
+            self._require_wanted(job.id)
             result = self._steps[job.kind](job, rows)
             over = job.with_(state="done", stage="", progress=1.0, result=result)
         except SandboxError as error:
@@ -293,6 +297,12 @@ class Jobs:
                 progress=lambda stage, share: self._progress(job.id, stage, share),
             )
         )
+
+    def _require_wanted(self, job_id: str) -> None:
+        """Stop before the step of a job that was cancelled after its file was encoded."""
+        if self._stops[job_id].is_set():
+            msg = "cancelled"
+            raise SandboxError(msg, "cancelled")
 
     def _stopped(self, job: Job, error: SandboxError) -> Job | None:
         """Say what becomes of a job whose task was stopped; None when it waits again."""
@@ -342,7 +352,7 @@ class Jobs:
         """Note a change of state in the spool, outside the lock: a disk may take its time."""
         try:
             self._spool.save(job)
-        except SpemError as error:
+        except (SpemError, OSError, ValueError) as error:
             _log.error("job %s: %s", job.id, error)
 
     def _progress(self, job_id: str, stage: str, share: float) -> None:

@@ -56,27 +56,33 @@ class Process:
     def start(cls, folder: Path, memory_limit: int) -> Self:
         """Start a process in a new folder below one."""
         home = Path(tempfile.mkdtemp(prefix="worker-", dir=folder))
-        pipes = [os.pipe() for _ in range(3)]
-        (requests, to_worker), (from_worker, replies), (lifeline, ours) = pipes
-        theirs = {"requests": requests, "replies": replies, "lifeline": lifeline}
-        options = theirs | {"memory_limit": memory_limit}
-        try:
+        with contextlib.ExitStack() as theirs, contextlib.ExitStack() as ours:
+            ours.callback(shutil.rmtree, home, ignore_errors=True)
+            requests, to_worker = _pipe(theirs, ours)
+            from_worker, replies = _pipe(ours, theirs)
+            lifeline, held = _pipe(theirs, ours)
+            ends = {"requests": requests, "replies": replies, "lifeline": lifeline}
             process = subprocess.Popen(  # noqa: S603 the interpreter itself
                 # -P keeps its folder off the path of modules, -s the user's own packages
-                [sys.executable, "-P", "-s", "-m", "spem.server.worker", json.dumps(options)],
+                [
+                    sys.executable,
+                    "-P",
+                    "-s",
+                    "-m",
+                    "spem.server.worker",
+                    json.dumps(ends | {"memory_limit": memory_limit}),
+                ],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 cwd=home,
                 env=_environment(home),
-                pass_fds=tuple(theirs.values()),
+                pass_fds=tuple(ends.values()),
                 start_new_session=True,
             )
-        finally:
-            for end in theirs.values():
-                os.close(end)
+            ours.pop_all()
         os.set_blocking(to_worker, False)
-        return cls(process, to_worker, from_worker, ours, home)
+        return cls(process, to_worker, from_worker, held, home)
 
     def alive(self) -> bool:
         """Tell whether it is there; it is not reaped, so that its number stays its own."""
@@ -89,9 +95,10 @@ class Process:
         left = memoryview(len(body).to_bytes(LENGTH_BYTES, "little") + body)
         while left:
             go_on()
-            _, writable, _ = select.select([], [self.requests], [], _LOOK)
             try:
-                written = os.write(self.requests, left[:_CHUNK]) if writable else 0
+                written = (
+                    os.write(self.requests, left[:_CHUNK]) if _ready(self.requests, select.POLLOUT) else 0
+                )
             except BlockingIOError:
                 continue
             except OSError as error:
@@ -129,8 +136,7 @@ class Process:
         parts = bytearray()
         while len(parts) < count:
             go_on()
-            readable, _, _ = select.select([self.replies], [], [], _LOOK)
-            if readable:
+            if _ready(self.replies, select.POLLIN):
                 part = os.read(self.replies, min(count - len(parts), _CHUNK))
                 if not part:
                     raise self._dead()
@@ -157,6 +163,21 @@ class Process:
         how = signal.Signals(status).name if killed else f"status {status}"
         msg = f"the process of this task died ({how}); the file may be damaged, or too large for its memory"
         return SandboxError(msg, "died")
+
+
+def _pipe(reader: contextlib.ExitStack, writer: contextlib.ExitStack) -> tuple[int, int]:
+    """Open a pipe whose ends are closed with these."""
+    ends = os.pipe()
+    for stack, end in zip((reader, writer), ends, strict=True):
+        stack.callback(os.close, end)
+    return ends
+
+
+def _ready(end: int, event: int) -> bool:
+    """Wait a moment for a pipe; `select` would take no descriptor above 1023, which a busy server has."""
+    poll = select.poll()
+    poll.register(end, event)
+    return bool(poll.poll(1000 * _LOOK))
 
 
 def _environment(home: Path) -> dict[str, str]:

@@ -32,6 +32,7 @@ class Remembered:
         self._size, self._seconds = size, seconds
         self._lock = threading.Lock()
         self._values: OrderedDict[Hashable, tuple[float, Any]] = OrderedDict()
+        self._cleared = 0
 
     def get(self, key: Hashable, make: Callable[[], Value]) -> Value:
         """Return a value, made where there is none or an old one."""
@@ -42,8 +43,12 @@ class Remembered:
                 self._values.move_to_end(key)
                 known: Value = value
                 return known
+            cleared = self._cleared
         fresh = make()
         with self._lock:
+            if cleared != self._cleared:
+                # made of what was before, perhaps
+                return fresh
             self._values[key] = (now, fresh)
             self._values.move_to_end(key)
             while len(self._values) > self._size:
@@ -54,3 +59,4 @@ class Remembered:
         """Forget all values."""
         with self._lock:
             self._values.clear()
+            self._cleared += 1

@@ -215,30 +215,34 @@ class Sandbox:
 
         worker.send(body, go_on)
         while True:
+            frame = worker.receive(self.memory_limit, go_on)
             try:
-                reply, arrays = unpack_arrays(worker.receive(self.memory_limit, go_on))
-            except errors.ReadError as error:
+                reply, arrays = unpack_arrays(frame)
+                if reply.get("state") != "stage":
+                    return reply, arrays
+                stage, share = str(reply["stage"]), float(reply["share"])
+            except (errors.ReadError, LookupError, TypeError, ValueError) as error:
                 msg = "the process of this task sent what is no reply; try again"
                 raise SandboxError(msg, "died") from error
-            if reply.get("state") != "stage":
-                return reply, arrays
             if progress:
-                progress(str(reply["stage"]), float(reply["share"]))
+                progress(stage, share)
 
     def _outcome(
         self, task: str, reply: dict[str, Any], arrays: dict[str, NDArray[Any]]
     ) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """Return what a task returned, or raise what it raised."""
         state = reply.get("state")
-        self._counts["done" if state == "done" else "refused"] += 1
-        if state == "done":
-            return reply["header"], arrays
+        header = reply.get("header")
+        if state == "done" and isinstance(header, dict):
+            self._count("done")
+            return header, arrays
+        self._count("refused")
         if state == "error":
             kind = getattr(errors, str(reply.get("kind")), SpemError)
             known = isinstance(kind, type) and issubclass(kind, SpemError)
             raise (kind if known else SpemError)(str(reply.get("message")))
         if state == "memory":
-            self._counts["memory"] += 1
+            self._count("memory")
             size = self.memory_limit >> 20
             msg = f"needs more than {size} MiB, the memory limit of a task; send a smaller or coarser shape"
             raise SandboxError(msg, "memory")
@@ -253,11 +257,16 @@ class Sandbox:
 
     def _discard(self, worker: Process, why: str) -> None:
         """Kill a worker and start another in its place."""
-        self._counts[why] += 1
+        self._count(why)
         with self._changed:
             self._all.discard(worker)
         worker.drop()
         self._start()
+
+    def _count(self, what: str) -> None:
+        """Count what came of a task or a worker."""
+        with self._changed:
+            self._counts[what] += 1
 
     def _start(self) -> None:
         """Start a worker; it is free when it is warm."""
@@ -284,7 +293,7 @@ class Sandbox:
                 pause = min(2 * pause, _LONGEST_RETRY)
                 continue
             self._trouble = ""
-            self._counts["started"] += 1
+            self._count("started")
             self._give(worker)
             return
 

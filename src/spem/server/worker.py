@@ -154,7 +154,10 @@ def _follow_parent(lifeline: int, home: Path) -> None:
     """End the whole group when the other end of a pipe is closed, as it is when the parent dies."""
 
     def watch() -> None:
-        select.select([lifeline], [], [])
+        # its number may be above what `select` takes
+        poll = select.poll()
+        poll.register(lifeline, select.POLLIN)
+        poll.poll()
         shutil.rmtree(home, ignore_errors=True)
         # the last one takes the folder of all with it
         with contextlib.suppress(OSError):
