@@ -11,6 +11,7 @@ pytest.importorskip("fastapi")
 from spem.cli.app import app
 from spem.index.index import Index
 from spem.server import running
+from spem.server.spool import Spool
 from spem.shapes import synthetic
 
 TOKEN = "0123456789abcdef0123"  # noqa: S105
@@ -87,3 +88,16 @@ def test_sizes_are_in_mebibytes(started):
     options, db = started
     run(db, "--port", "0", "--memory", "1024", "--upload", "2")
     assert (options[0].memory, options[0].upload_bytes) == (1 << 30, 2 << 20)
+
+
+def test_folder_of_another_server(started, tmp_path):
+    """A folder for jobs that another server uses is refused in one line, before anything starts."""
+    options, db = started
+    held = Spool(tmp_path)
+    done = run(db, "--port", "0", "--state", str(tmp_path))
+    held.close()
+    assert done.exit_code != 0
+    assert "another server uses this folder" in done.stderr
+    assert "serving" not in done.stdout
+    assert options == []
+    assert run(db, "--port", "0", "--state", str(tmp_path)).exit_code == 0

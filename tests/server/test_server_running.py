@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import io
 import json
@@ -22,10 +23,12 @@ pytest.importorskip("fastapi")
 
 import httpx
 
-from spem.errors import ParameterError
+from spem.errors import ParameterError, SandboxError
 from spem.index.index import Index
 from spem.server.options import ServerOptions
 from spem.server.running import listen
+from spem.server.services import Services
+from spem.server.spool import Spool
 
 
 @pytest.fixture(scope="module")
@@ -122,3 +125,16 @@ def test_options_are_checked(wrong, told):
 def test_the_token_is_not_shown():
     """The token stands in no text that is made of the options."""
     assert "secret" not in repr(ServerOptions(token="secret-secret-secret"))  # noqa: S106
+
+
+def test_a_start_that_fails_leaves_nothing_running(folder, tmp_path):
+    """Where jobs have no folder the worker processes that were started by then are ended."""
+    services = Services(Index.open(folder / "db"), ServerOptions(state=tmp_path, n_workers=1))
+    held = Spool(tmp_path)
+    with pytest.raises(ParameterError, match="another server uses this folder"):
+        asyncio.run(services.start())
+    held.close()
+    assert services.sandbox.stats()["free"] == 0
+    with pytest.raises(SandboxError, match="going down"):
+        services.sandbox.run("view", {})
+    assert not services.ready

@@ -66,6 +66,7 @@ def serve(
     from spem.index.index import Index
     from spem.server.options import ServerOptions
     from spem.server.running import listen, run
+    from spem.server.spool import Spool
 
     options = ServerOptions(
         host=host,
@@ -84,6 +85,9 @@ def serve(
         state=state,
     )
     index = Index.open(db, create=False)
+    if state is not None:
+        # told here in one line, and not while the server starts
+        Spool(state).close()
     socket = listen(options)
     address = _address(options, socket.getsockname()[1])
     _warn(options)

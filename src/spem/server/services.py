@@ -58,22 +58,30 @@ class Services:
 
     async def start(self) -> None:
         """Start worker processes, take up jobs of an earlier run, and warm the index."""
+        try:
+            await self._bring_up()
+        except BaseException:
+            await asyncio.to_thread(self._open.close)
+            raise
+        self._started = True
+
+    async def _bring_up(self) -> None:
+        """Start what has to be closed again."""
         options = self.options
         folder = options.state or Path(self._open.enter_context(tempfile.TemporaryDirectory(prefix="spem-")))
         self.sandbox = Sandbox(options.n_workers, options.memory, options.seconds)
         self._open.callback(self.sandbox.close)
+        for lane in (self.reads, self.views):
+            self._open.callback(lane.close)
         self.viewing = Viewing(self.sandbox, self.kept, self.views)
         index, steps = self.catalogue.index, self.submissions.steps
         self.jobs = Jobs(folder, self.sandbox, index, steps, queue=options.queue)
+        self._open.callback(self.jobs.close, options.finish_seconds)
         await self.reads.run(self.catalogue.models)
-        self._started = True
 
     async def close(self) -> None:
         """Finish jobs or put them back, then end worker processes and threads."""
         self._started = False
-        await asyncio.to_thread(self.jobs.close, self.options.finish_seconds)
-        for lane in (self.reads, self.views):
-            lane.close()
         await asyncio.to_thread(self._open.close)
 
     @property
