@@ -68,6 +68,9 @@ class Writer:
             elif words[0] == "done":
                 told.done.update(words[1:])
         told.killed = int(words[1]) == signal.SIGKILL
+        if not told.killed:
+            msg = f"the writer ended by itself, with status {words[1]}, before it was killed"
+            raise RuntimeError(msg)
         return told
 
     def close(self) -> None:
@@ -129,7 +132,7 @@ def main(argv: list[str] | None = None) -> None:
         benchmark.table("what was wrong", [{"fault": each} for each in wrong])
     for row in rows:
         what = f"whole after kill -9 while {row['killed while']}, share of {row['rounds']}"
-        benchmark.target(what, row["whole"] / row["rounds"], 1.0, at_least=True)
+        benchmark.target(what, row.get("whole", 0) / row["rounds"], 1.0, at_least=True)
     benchmark.write()
 
 
