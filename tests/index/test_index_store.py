@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from spem.index.database_errors import told
 from spem.index.index import Index
 from spem.index.row import Row
 from spem.index.store import Store
-from spem.index.updates import write
+from spem.index.updates import known, write
 
 AsRoot = pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
 
@@ -120,10 +121,25 @@ def test_damaged_data_are_told_on_one_line(filled: Index, damage: str) -> None:
         else:
             kept = {"truncated": content[: len(content) // 2], "emptied": b""}
             file.write_bytes(kept.get(damage, b"\xff" * len(content)))
-    with pytest.raises(ReadError, match=r"shapes.db: damaged \(.*\); see: spem index check") as refused:
-        Index.open(address).rows()
-    assert "\n" not in str(refused.value)
-    assert ".rs" not in str(refused.value)
+    index = Index.open(address)
+    for read in (index.rows, lambda: known(index.store, index.digest())):
+        with pytest.raises(ReadError, match=r"shapes.db: damaged \(.*\); see: spem index check") as refused:
+            read()
+        assert "\n" not in str(refused.value)
+        assert ".rs" not in str(refused.value)
+
+
+def test_no_room_for_temporary_files_is_told(
+    filled: Index, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A model is read by way of a file; where that cannot be written, one line says so."""
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("spem.files.os.fsync", full)
+    with pytest.raises(ParameterError, match="cannot be written"):
+        Index.open(filled.store.address).model()
 
 
 def test_a_table_half_made_is_made_again(

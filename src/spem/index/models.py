@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from spem.codes.model import Model
 from spem.errors import ModelError, ReadError
+from spem.files import write_whole
 from spem.index.extra import require
 from spem.index.schema import models_schema
 
@@ -70,10 +71,12 @@ def from_bytes(data: bytes, digest: str, address: str) -> Model:
     ------
     ModelError
         When they are damaged, or of another model.
+    ParameterError
+        When the folder of temporary files cannot be written, or is full.
     """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "model.spem")
-        file.write_bytes(data)
+        write_whole(file, lambda opened: opened.write(data))
         try:
             model = Model.load(file)
         except ReadError as error:

@@ -53,7 +53,9 @@ def write(store: Store, digest: str, rows: Sequence[Row]) -> None:
 
 def known(store: Store, digest: str) -> list[Known]:
     """Return what a plan needs of the rows."""
-    records = store.query(digest).select(["hash", "path", "copies"]).to_list()
+    query = store.query(digest).select(["hash", "path", "copies"])
+    with told(store.address):
+        records = query.to_list()
     return [
         Known(record["hash"], tuple(map(store.found, (record["path"], *record["copies"]))))
         for record in records
