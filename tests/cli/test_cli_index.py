@@ -96,6 +96,7 @@ def test_export_writes_what_evaluate_takes(spem: Command, refused: Callable[...,
     (db.parent / "labels.csv").write_text("file,label\ncat.png,one\ncow.png,one\n")
     scores = spem("evaluate", db.parent / "shapes.spem", "--labels", db.parent / "labels.csv", "--json", "-")
     assert json.loads(scores.stdout)["n_shapes"] == 2
+    refused(spem("evaluate", db, "--labels", db.parent / "labels.csv"), "spem index export")
     refused(spem("index", "export", db, "shapes.xlsx"), "ends in .csv, .parquet, .spem")
 
 

@@ -40,13 +40,14 @@ def test_codes_are_written_when_asked(filled: Index, tmp_path: Path) -> None:
 
 
 def test_codes_files_hold_the_same_distances(filled: Index, tmp_path: Path) -> None:
-    """What is exported for scores is the index's codes under its model."""
+    """What is exported for scores is the index's codes under its model, with volumes for the control."""
     assert filled.export(tmp_path / "shapes.spem") == 4
     codes = Codes.load(tmp_path / "shapes.spem")
     assert codes.names == ("cat", "cow", "d'oh", "dog")
     assert codes.model.digest == filled.digest()
     assert np.linalg.norm(codes.vectors, axis=1) == pytest.approx(1.0, abs=1e-6)
     assert np.array_equal(codes.vectors, filled.codes().vectors)
+    assert codes.volumes.tolist() == [row.volume for row in filled.rows(sort="name")]
 
 
 def test_what_cannot_be_written_is_refused(filled: Index, tmp_path: Path) -> None:

@@ -72,11 +72,15 @@ def test_filters_can_be_shared_and_cleared(tabs):
     assert _query(page) == {"sort": ["volume"]}
 
 
-def test_model_is_chosen_at_the_foot(tabs, explored):
-    """Of an index with several models one is looked at, and the address names it."""
-    page = tabs.open(f"?model={explored.solid}")
+def test_model_is_chosen_in_the_bar(tabs, explored):
+    """Of an index with several models one is looked at, and the address names it; long names fit a phone."""
+    page = tabs.open(f"?model={explored.solid}", viewport={"width": 360, "height": 740})
     expect(page.locator(".count")).to_have_text("3 shapes")
-    page.get_by_label("Model").select_option(explored.flat)
+    choice = page.get_by_label("Model")
+    expect(choice).to_be_in_viewport()
+    choice.evaluate("(box) => box.options[0].append(' and'.repeat(40))")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
+    choice.select_option(explored.flat)
     expect(page.locator(".count")).to_have_text("12 shapes")
     assert _query(page)["model"] == [explored.flat]
 

@@ -175,6 +175,9 @@ def _load_labelled(path: Path, labels: Path, *, ignore_unlabelled: bool) -> tupl
     from spem.collections import row_keys
     from spem.retrieval.labels import match_labels, read_labels, unused_labels
 
+    if path.is_dir():
+        msg = f"{path}: a folder; where it is an index: spem index export {path} codes.spem writes its codes"
+        raise ParameterError(msg)
     codes, table = Codes.load(path), read_labels(labels)
     unused = unused_labels(row_keys(codes), table)
     if unused:

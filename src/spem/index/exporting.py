@@ -78,13 +78,15 @@ def codes_of(store: Store, digest: str, where: str | None = None) -> Codes:
     ParameterError
         When a filter lets no row through.
     """
-    table = _read(store, digest, where, ("name", "path", "hash", "vector"))
+    table = _read(store, digest, where, ("name", "path", "hash", "volume", "vector"))
     if not table.num_rows:
         of = f"model {digest}" + (f" where {where}" if where else "")
         msg = f"{store.address}: no shape of {of}, so there are no codes to write"
         raise ParameterError(msg)
     names, paths, hashes = (table.column(name).to_pylist() for name in ("name", "path", "hash"))
-    return Codes(names, tuple(map(store.found, paths)), hashes, _vectors(table), store.load_model(digest))
+    volumes = table.column("volume").to_numpy()
+    files = tuple(map(store.found, paths))
+    return Codes(names, files, hashes, _vectors(table), store.load_model(digest), volumes=volumes)
 
 
 def flat_table(

@@ -70,7 +70,7 @@ class Records:
         if given is None:
             if len(known) == 1:
                 return known[0]
-            msg = f"{self.store.address}: {len(known)} models ({', '.join(known)}); name one of them"
+            msg = f"{self.store.address}: {len(known)} models ({', '.join(known)}); name one of them as the model (--model)"
             if not known:
                 msg = f"{self.store.address}: an index without a shape; add some first"
             raise ModelError(msg)

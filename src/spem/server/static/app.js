@@ -1,7 +1,7 @@
-/** What every page has: routes, search by file, keys, and the line at the foot. */
+/** What every page has: routes, search by file, keys, and what is told of the server. */
 
 import { info } from "./api.js";
-import { element } from "./dom.js";
+import { counted, element } from "./dom.js";
 import { renderGallery } from "./gallery.js";
 import { go, href, readState, route, start } from "./router.js";
 import { takeFiles } from "./upload.js";
@@ -28,13 +28,14 @@ function keys() {
 }
 
 async function about() {
-  const place = document.getElementById("about");
+  const [version, choice] = ["about", "model"].map((id) => document.getElementById(id));
   try {
-    const { version, models, model } = await info();
-    place.replaceChildren(`spem ${version}`);
-    if (models.length > 1) place.append(modelChoice(models, model));
+    const known = await info();
+    version.replaceChildren(`spem ${known.version}`);
+    choice.replaceChildren(...(known.models.length > 1 ? [modelChoice(known.models, known.model)] : []));
   } catch {
-    place.replaceChildren(); // The page itself says what is wrong.
+    version.replaceChildren(); // The page itself says what is wrong.
+    choice.replaceChildren();
   }
 }
 
@@ -46,7 +47,7 @@ function modelChoice(models, chosen) {
     go(`${new URL(document.baseURI).pathname}?${state}`);
   };
   const options = models.map(({ digest, features, ndim, n_shapes }) => {
-    const words = [ndim ? `${ndim}-D` : "", [].concat(features).join(", "), n_shapes.toLocaleString("en")];
+    const words = [ndim ? `${ndim}-D` : "", counted(n_shapes, "shape"), features];
     return element("option", { value: digest, selected: digest === chosen }, words.filter(Boolean).join(" · "));
   });
   return element(
