@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fastapi import Request
@@ -11,12 +13,13 @@ from python_multipart.multipart import parse_options_header
 from starlette.datastructures import UploadFile
 
 from spem.errors import ReadError
+from spem.server.limits import client_of
 from spem.server.queries import LONGEST_TEXT
 from spem.server.refusals import Busy, Refusal
 from spem.server.uploads import safe_name, upload_suffix
 
-# Forms being received at a time; each may hold an upload in memory.
-_AT_A_TIME = 8
+# Forms being received at a time, of all clients and of one; each may hold an upload in memory.
+_AT_A_TIME, _OF_ONE = 8, 4
 _FIELDS = 8
 _FIELD_BYTES = 16 << 10
 _SECONDS = 300.0
@@ -96,10 +99,17 @@ class Form:
 
 
 class Forms:
-    """Receives forms, a few at a time."""
+    """Receives forms, a few at a time, and of one client not all of these.
 
-    def __init__(self) -> None:
-        self._inside = 0
+    Parameters
+    ----------
+    proxies
+        Addresses that are believed about whom they speak for.
+    """
+
+    def __init__(self, proxies: Sequence[str] = ()) -> None:
+        self._proxies = proxies
+        self._inside: Counter[str] = Counter()
 
     async def receive(self, request: Request) -> Form:
         """Return the form of a request.
@@ -109,10 +119,11 @@ class Forms:
         Refusal
             When it is no form with one file of a known kind, comes too slowly, or too many come at once.
         """
-        if self._inside >= _AT_A_TIME:
+        client = client_of(request.scope, self._proxies)
+        if self._inside.total() >= _AT_A_TIME or self._inside[client] >= _OF_ONE:
             msg = "too many uploads at once; come again in a moment"
             raise Busy(msg, 2.0)
-        self._inside += 1
+        self._inside[client] += 1
         try:
             async with asyncio.timeout(_SECONDS):
                 return await _received(request)
@@ -120,7 +131,9 @@ class Forms:
             msg = f"the body did not come within {_SECONDS:g} s"
             raise Refusal(408, msg, {"Connection": "close"}) from error
         finally:
-            self._inside -= 1
+            self._inside[client] -= 1
+            # clients that send nothing any more are not remembered
+            self._inside = +self._inside
 
 
 async def _received(request: Request) -> Form:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Path, Query
@@ -19,6 +21,8 @@ router = APIRouter(prefix="/api/shapes", tags=["views"])
 FILES = ("field.npz", "maps.npz", "parts.npz", "node.csv", "surface.ply")
 _MOST_PARTS, _MOST_MAPS, _MOST_NODES = 12, 64, 2_000_000
 _BINARY = "application/octet-stream"
+# A worker that was taken over must not write headers of its own.
+_PLAIN = re.compile(r"[\w.+/;= -]+", re.ASCII)
 
 
 @router.get(
@@ -49,5 +53,14 @@ async def download(
         digest, id, "download", options, lambda: live.row(digest, id, "shape")[1]
     )
     header, arrays = unpack_arrays(packed)
-    headers = {"Content-Disposition": f'attachment; filename="{header["file"]}"', "Cache-Control": "no-store"}
-    return Response(arrays["body"].tobytes(), 200, headers, header["media_type"])
+    name, media_type = _plain(header, "file"), _plain(header, "media_type")
+    headers = {"Content-Disposition": f'attachment; filename="{name}"', "Cache-Control": "no-store"}
+    return Response(arrays["body"].tobytes(), 200, headers, media_type)
+
+
+def _plain(header: Mapping[str, Any], name: str) -> str:
+    """Return a text of a view that is fit for a header."""
+    value = header.get(name)
+    if isinstance(value, str) and _PLAIN.fullmatch(value):
+        return value
+    raise Refusal(422, "this file cannot be made; please report it")
