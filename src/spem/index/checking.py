@@ -13,6 +13,7 @@ from spem.codes.codes import file_hash
 from spem.errors import ReadError, SpemError
 from spem.index import updates
 from spem.index.database_errors import brief, told
+from spem.index.filters import literal
 from spem.index.row import ID_DIGITS, unpack
 from spem.index.schema import HEAVY, LIGHT, layout_of
 from spem.index.store import Store
@@ -135,7 +136,10 @@ def _repair(store: Store, digest: str, findings: list[Finding]) -> None:
     ids = list(dict.fromkeys(one.where for one in findings if one.repairable))
     twice = [one.where for one in findings if "twice" in one.reason]
     damaged = {one.where for one in findings if one.repairable and "twice" not in one.reason}
-    kept = [store.rows(digest, f"id = '{row_id}'", columns=[*LIGHT, *HEAVY], limit=1)[0] for row_id in twice]
+    kept = [
+        store.rows(digest, f"id = {literal(row_id)}", columns=[*LIGHT, *HEAVY], limit=1)[0]
+        for row_id in twice
+    ]
     updates.remove(store, digest, ids)
     again = {row.id: row for row in kept if row.id not in damaged}
     updates.write(store, digest, list(again.values()))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spem.index.database_errors import told
 from spem.index.extra import require
+from spem.index.filters import any_of
 from spem.index.pinned import Pinned
 from spem.index.schema import LIGHT
 
@@ -202,8 +203,7 @@ def _codes(rows: Any, n_code: int) -> NDArray[np.float32]:
 
 def _search_ids(table: Any, ids: Sequence[str], columns: Sequence[str]) -> pyarrow.Table:
     """Read some columns of the rows of these ids."""
-    listed = ", ".join("'" + each.replace("'", "''") + "'" for each in ids)
-    return table.search().where(f"id IN ({listed or 'NULL'})").select(list(columns)).to_arrow()
+    return table.search().where(any_of("id", list(ids))).select(list(columns)).to_arrow()
 
 
 def _snapshot(pinned: Pinned, rows: pyarrow.Table, vectors: NDArray[np.float32]) -> Snapshot:

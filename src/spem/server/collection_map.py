@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from spem.index.extra import require
+from spem.index.filters import any_of
 from spem.server.cards import to_json
 from spem.server.catalogue import Catalogue
 
@@ -11,6 +15,8 @@ from spem.server.catalogue import Catalogue
 MOST_POINTS = 20_000
 _METHOD = "t-SNE of correlation distances"
 _DIGITS = 5
+# Rows that one filter names.
+_AT_ONCE = 2000
 
 
 def collection_map(catalogue: Catalogue, digest: str) -> bytes:
@@ -26,11 +32,7 @@ def collection_map(catalogue: Catalogue, digest: str) -> bytes:
     from spem.index.layout import lay_out
 
     rng = np.random.default_rng(0)
-    table = catalogue.index.store.table(digest).search().select(["id", "name", "label", "vector"]).to_arrow()
-    total = len(table)
-    table = table.sort_by("id")
-    if total > MOST_POINTS:
-        table = table.take(np.sort(rng.choice(total, MOST_POINTS, replace=False)))
+    table, total = _codes(catalogue.index.store.table(digest), rng)
     flat = table["vector"].combine_chunks().flatten().to_numpy(zero_copy_only=False)
     places = lay_out(flat.reshape(len(table), -1), rng) if len(table) else np.zeros((0, 2))
     records = table.select(["id", "name", "label"]).to_pylist()
@@ -39,3 +41,21 @@ def collection_map(catalogue: Catalogue, digest: str) -> bytes:
         for record, (x, y) in zip(records, places, strict=True)
     ]
     return to_json({"method": _METHOD, "points": points, "total": total})
+
+
+def _codes(table: Any, rng: np.random.Generator) -> tuple[Any, int]:
+    """Return names and codes in order of the ids, of very many those of a sample, and the number of rows."""
+    columns = ["id", "name", "label", "vector"]
+    total = int(table.count_rows())
+    if total <= MOST_POINTS:
+        return table.search().select(columns).to_arrow().sort_by("id"), total
+    ids = np.sort(table.search().select(["id"]).to_arrow()["id"].to_numpy())
+    chosen = rng.choice(ids, MOST_POINTS, replace=False)
+    read = [
+        table.search()
+        .where(any_of("id", chosen[start : start + _AT_ONCE].tolist()))
+        .select(columns)
+        .to_arrow()
+        for start in range(0, MOST_POINTS, _AT_ONCE)
+    ]
+    return require("pyarrow").concat_tables(read).sort_by("id"), total

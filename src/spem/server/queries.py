@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from spem.index.filters import literal
 from spem.server.refusals import Refusal
 
 Sort = Literal["name", "added", "volume"]
@@ -68,7 +69,7 @@ def quoted(text: str) -> str:
     """
     if any(ord(letter) < ord(" ") for letter in text):
         raise Refusal(422, "a text with control characters; leave them out")
-    return "'" + text.replace("'", "''") + "'"
+    return literal(text)
 
 
 def parse_metadata(pairs: Sequence[str]) -> tuple[tuple[str, str], ...]:
