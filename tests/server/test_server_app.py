@@ -504,3 +504,22 @@ def test_odd_values_on_every_route(client):
                     assert set(answer.json()) == {"error"}
                 tried += 1
     assert tried > 150
+
+
+def test_shapes_are_found_without_the_name_of_their_model(tmp_path):
+    """An id leads to its shape whichever model has most shapes; a model that is named has to have it."""
+    made = Index.open(tmp_path / "shapes.db")
+    made.add([disk(6.0), disk(7.0)], features="spem", voxels=None, n_centers=4)
+    flat = made.digest()
+    ball = spem.synthetic.ball(radius=4.0, spacing=1.0)
+    solid = spem.encode([ball], features="spem", voxels=None, n_centers=4).model
+    made.add([ball], model=solid)
+    [row] = made.rows(model=solid.digest)
+    with served(create_app(made), lifespan="off") as client:
+        address = f"/api/shapes/{row.id}"
+        assert client.get("/api/info").json()["model"] == flat
+        assert client.get(address).json()["model"] == solid.digest
+        assert client.get(f"{address}/thumbnail.png").status_code == 200
+        assert client.get(f"{address}/neighbours").json()["answers"][0]["shape"]["id"] == row.id
+        assert client.get(address, params={"model": flat}).status_code == 404
+        assert client.get(f"/api/shapes/{ABSENT}").status_code == 404

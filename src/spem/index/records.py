@@ -70,7 +70,8 @@ class Records:
         if given is None:
             if len(known) == 1:
                 return known[0]
-            msg = f"{self.store.address}: {len(known)} models ({', '.join(known)}); name one of them as the model (--model)"
+            several = f"{len(known)} models ({', '.join(known)})"
+            msg = f"{self.store.address}: {several}; name one of them as the model (--model)"
             if not known:
                 msg = f"{self.store.address}: an index without a shape; add some first"
             raise ModelError(msg)

@@ -78,8 +78,11 @@ class Catalogue:
             entries.append(ModelEntry(digest, features, ndim, count, n_code))
         return sorted(entries, key=lambda entry: (-entry.n_shapes, entry.digest))
 
-    def digest(self, wanted: str | None) -> str:
-        """Return the digest of the model that is asked for, of the one with most shapes where none is.
+    def digest(self, wanted: str | None, key: str | None = None) -> str:
+        """Return the digest of the model that is asked for.
+
+        Where none is, that of the model with most shapes, of those that have a row where its id is given:
+        which model has most changes while shapes are added, and addresses of shapes stay.
 
         Raises
         ------
@@ -90,10 +93,18 @@ class Catalogue:
             known = self.models()
             if not known:
                 raise Refusal(404, "the index has no shapes yet; add some first")
-            return known[0].digest
+            several = known if key is not None and len(known) > 1 and is_id(key) else ()
+            return next((entry.digest for entry in several if self._has(entry.digest, key)), known[0].digest)
         if not is_digest(wanted) or wanted not in (entry.digest for entry in self.models()):
             raise Refusal(404, "no such model; /api/info lists the models")
         return wanted
+
+    def _has(self, digest: str, key: str | None) -> bool:
+        """Tell whether a model has a row of this id."""
+        held = self.held(digest)
+        if held is not None:
+            return held.place(str(key)) is not None
+        return self.index.store.count(digest, f"id = {quoted(str(key))}") > 0
 
     def labels(self, digest: str) -> list[dict[str, Any]]:
         """Return the labels and the number of shapes of each, in order of name."""

@@ -82,7 +82,7 @@ async def neighbours(
 
     def find() -> bytes:
         if not id.startswith(UPLOAD):
-            return live.catalogue.neighbours(live.catalogue.digest(model), id, k, where, rerank=rerank)
+            return live.catalogue.neighbours(live.catalogue.digest(model, id), id, k, where, rerank=rerank)
         digest, row = live.row(model, id)
         return live.catalogue.nearest(digest, row, k, where, rerank=rerank)
 
@@ -93,4 +93,4 @@ def _picture(live: Services, model: str | None, key: str) -> bytes:
     """Return the thumbnail of a shape of the index, or of an upload."""
     if key.startswith(UPLOAD):
         return live.row(model, key)[1].thumbnail
-    return live.catalogue.thumbnail(live.catalogue.digest(model), key)
+    return live.catalogue.thumbnail(live.catalogue.digest(model, key), key)

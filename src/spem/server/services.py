@@ -99,7 +99,7 @@ class Services:
         """
         if key.startswith(UPLOAD):
             return self.submissions.found(self.jobs, key)
-        digest = self.catalogue.digest(model)
+        digest = self.catalogue.digest(model, key)
         return digest, self.catalogue.row(digest, key, *columns)
 
     def _readings(self) -> dict[str, tuple[str, float]]:
