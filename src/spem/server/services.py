@@ -51,7 +51,7 @@ class Services:
         self.views = Lane("view", options.n_workers, options.queue)
         self.kept = Cache(options.view_bytes)
         self.rate = Rate(options.rate)
-        self.forms = Forms()
+        self.forms = Forms(options.proxies)
         self.metrics = Metrics(self._readings)
         self._open = contextlib.ExitStack()
         self._started = False
