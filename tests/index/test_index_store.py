@@ -7,6 +7,7 @@ import os
 import shutil
 from collections.abc import Callable
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -126,6 +127,17 @@ def test_damaged_data_are_told_on_one_line(filled: Index, damage: str) -> None:
         with pytest.raises(ReadError, match=r"shapes.db: damaged \(.*\); see: spem index check") as refused:
             read()
         assert "\n" not in str(refused.value)
+        assert ".rs" not in str(refused.value)
+
+
+def test_an_index_that_was_removed_is_told(filled: Index, ready_row: Callable[..., Row]) -> None:
+    """Of an index that is gone while it is open, reading and writing say so on one line."""
+    digest = filled.digest()
+    shutil.rmtree(filled.store.address)
+    writes = partial(write, filled.store, digest, [ready_row("cow")])
+    for use in (partial(known, filled.store, digest), partial(filled.store.count, digest), writes):
+        with pytest.raises(ReadError, match="damaged") as refused:
+            use()
         assert ".rs" not in str(refused.value)
 
 

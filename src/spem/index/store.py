@@ -238,7 +238,9 @@ class Store:
         self, digest: str, where: str | None = None, *, sort: str | None = None, descending: bool = False
     ) -> Any:
         """Return a query of the database for rows that a filter lets through, in an order."""
-        query = self.table(digest).search()
+        table = self.table(digest)
+        with told(self.address):
+            query = table.search()
         if sort is not None and sort not in (*LIGHT[:4], "label", "ndim", "n_nodes", "volume", "added"):
             msg = f"sort={sort!r}: no order of rows; expected name, label, path, volume, n_nodes or added"
             raise ParameterError(msg)

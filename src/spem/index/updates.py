@@ -41,7 +41,9 @@ def write(store: Store, digest: str, rows: Sequence[Row]) -> None:
     ParameterError
         When the codes have another length than the model's, or nothing can be written.
     """
-    n_code = _n_code(store.table(digest))
+    table = store.table(digest)
+    with told(store.address):
+        n_code = _n_code(table)
     odd = next((row for row in rows if len(row.code) != n_code), None)
     if odd is not None:
         msg = f"{odd.name}: a code of {len(odd.code)} numbers, those of model {digest} have {n_code}"

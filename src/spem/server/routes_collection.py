@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
 from spem import __version__
+from spem.index.database_errors import told
 from spem.index.row import Row
 from spem.server.arrays import MEDIA_TYPE, pack_arrays
 from spem.server.collection_map import collection_map
@@ -35,7 +36,9 @@ async def whole_map(request: Request, live: Live, model: ModelName = None) -> Re
 def _version(live: Services, model: str | None) -> tuple[str, int]:
     """Return the model and the version of its table."""
     digest = live.catalogue.digest(model)
-    return digest, int(live.catalogue.index.store.table(digest).version)
+    store = live.catalogue.index.store
+    with told(store.address):
+        return digest, int(store.table(digest).version)
 
 
 @router.get(
