@@ -96,7 +96,6 @@ def test_export_writes_what_evaluate_takes(spem: Command, refused: Callable[...,
     (db.parent / "labels.csv").write_text("file,label\ncat.png,one\ncow.png,one\n")
     scores = spem("evaluate", db.parent / "shapes.spem", "--labels", db.parent / "labels.csv", "--json", "-")
     assert json.loads(scores.stdout)["n_shapes"] == 2
-    refused(spem("evaluate", db, "--labels", db.parent / "labels.csv"), "spem index export")
     refused(spem("index", "export", db, "shapes.xlsx"), "ends in .csv, .parquet, .spem")
 
 
@@ -121,3 +120,37 @@ def test_what_is_no_index_is_refused(
     refused(spem("index", "list", db, "--where", "colour = 1"), "no filter of rows")
     refused(spem("index", "list", db, "--model", "abc"), "model abc is none of")
     assert not (tmp_path / "none").exists()
+
+
+def test_evaluate_takes_the_labels_of_an_index(spem: Command, db: Path, tmp_path: Path) -> None:
+    """An index is scored by its own labels or a file's; unlabelled shapes are left out when asked."""
+    refused = spem("evaluate", db)
+    assert refused.exit_code == 2
+    assert "3 shapes without a label" in refused.stderr
+    spem("index", "label", db, "--where", "name LIKE 'c%'", "--as", "c")
+    told = spem("evaluate", db, "--ignore-unlabelled", "--json", "-")
+    assert told.exit_code == 0, told.stderr
+    facts = json.loads(told.stdout)
+    assert (facts["n_shapes"], facts["n_classes"], facts["NN"]) == (2, 1, 100.0)
+    assert "size_alone" in facts
+    labels = tmp_path / "labels.csv"
+    labels.write_text("cat.png,a\ncow.png,a\ndog.png,b\n")
+    assert json.loads(spem("evaluate", db, "--labels", labels, "--json", "-").stdout)["n_shapes"] == 3
+
+
+def test_codes_need_a_file_of_labels(spem: Command, tmp_path: Path) -> None:
+    """A file of codes knows no labels."""
+    refused = spem("evaluate", tmp_path / "codes.spem")
+    assert refused.exit_code == 2
+    assert "needs --labels" in refused.stderr
+
+
+def test_names_keep_to_their_line(spem: Command, db: Path) -> None:
+    """What a terminal obeys is shown as an escape."""
+    index = Index.open(db)
+    key = hashlib.sha256(b"evil").hexdigest()
+    code = np.random.default_rng(0).standard_normal(64).astype(np.float32)
+    write(index.store, index.digest(), [Row(row_id(key), key, "a\n\x1b[31mb", "/nowhere/a.png", code)])
+    lines = spem("index", "list", db).stdout.splitlines()
+    assert len(lines) == 5
+    assert any(line.startswith("a\\n\\x1b[31mb ") for line in lines)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
@@ -12,6 +12,7 @@ from spem.codes.vocabulary import Vocabulary, nearest_centers, sum_residuals
 from spem.errors import ParameterError
 
 
+@settings(deadline=None)  # the first call may compile
 @given(
     st.integers(0, 10_000),
     st.integers(1, 60),

@@ -52,6 +52,7 @@ def test_answers_become_plain_values_and_tables(answers: Answers) -> None:
     assert list(frame.columns) == table.column_names
     assert frame["name"].tolist() == table.column("name").to_pylist() == ["cat", "<b>dog</b>"]
     assert frame["distance"].tolist() == [0.25, 0.5]
+    assert dict(frame["metadata"][0]) == dict(table.column("metadata").to_pylist()[0]) == {"site": "Oslo"}
 
 
 def test_no_answers_are_a_table_too(filled: Index) -> None:

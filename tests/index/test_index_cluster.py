@@ -166,8 +166,9 @@ def test_lost_scheduler_is_told_in_one_line(cluster):
 
 def test_nobody_at_the_address(monkeypatch):
     """An address without a scheduler is refused within seconds, and one of another kind at once."""
-    with pytest.raises(ClusterError, match="expected the address of a Dask scheduler"):
-        list(ClusterExecutor("http://127.0.0.1:1").run(eval, ["1"]))
+    for address in ("http://127.0.0.1:1", "tcp://", "tcp://host", "head:8786"):
+        with pytest.raises(ClusterError, match="expected the address of a Dask scheduler"):
+            list(ClusterExecutor(address).run(eval, ["1"]))
     monkeypatch.setattr("spem.index.cluster.CONNECT", 0.2)
     with pytest.raises(ClusterError, match="no Dask scheduler answers there"):
         list(ClusterExecutor("tcp://127.0.0.1:1").run(eval, ["1"]))

@@ -148,7 +148,7 @@ def test_queries_by_file_and_shape(tmp_path: Path) -> None:
     np.save(tmp_path / "two.npy", np.pad(np.array([[1, 1, 0, 2, 2]]).repeat(3, 0), 1))
     with pytest.raises(ShapeError, match="holds 2 labels; add the file"):
         index.search(tmp_path / "two.npy")
-    with pytest.raises(ModelError, match=r"a code of shape \(3,\), expected 64 finite numbers"):
+    with pytest.raises(ModelError, match=r"a code of float64 of shape \(3,\), expected 64 finite numbers"):
         index.search(np.ones(3))
 
 
@@ -200,3 +200,16 @@ def test_a_version_that_is_cleaned_up_meanwhile(
 
     monkeypatch.setattr(index.snapshots, "pinned", pinned)
     assert index.search("new", 1)[0].row.name == "new"
+
+
+@pytest.mark.parametrize("code", [np.array(["a"] * 64), np.zeros(64, complex), np.zeros(64, object)])
+def test_codes_that_are_no_numbers_are_refused(filled, code):
+    """A code is a vector of real numbers."""
+    with pytest.raises(ModelError, match="finite numbers"):
+        filled.search(code)
+
+
+def test_a_filter_is_text(filled):
+    """What is no SQL is refused before the database sees it."""
+    with pytest.raises(ParameterError, match="a filter is SQL"):
+        filled.search("cat", where=5)

@@ -207,3 +207,10 @@ def test_nothing_is_written_to_stderr(filled: Index, capfd: pytest.CaptureFixtur
     filled.store.table(filled.digest()).search(np.ones(64, np.float32)).limit(1).to_list()
     filled.store.compact()
     assert capfd.readouterr().err == ""
+
+
+def test_an_index_without_its_models_is_told_apart(filled):
+    """Where the table of models is gone, the message says so rather than that this is no index."""
+    shutil.rmtree(Path(filled.store.address) / "models.lance")
+    with pytest.raises(ReadError, match="table of models is gone"):
+        Store.open(filled.store.address)

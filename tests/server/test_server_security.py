@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 pytest.importorskip("starlette")
 
+from spem.errors import ParameterError
+from spem.server.options import ServerOptions
 from spem.server.refusals import Refusal, plain
 from spem.server.security import host_allowed, require_own_site, require_token
 
@@ -81,3 +83,10 @@ def test_pages_of_this_server_may_send():
 def test_messages_lose_their_folders(message, told):
     """Of a path only its last name is told."""
     assert plain(message) == told if told is not None else "/srv" not in plain(message)
+
+
+@pytest.mark.parametrize("token", ["geheim-schlüssel-für-alle", "a-token-with-a-line\nend-in-it", "short"])
+def test_tokens_that_no_request_can_carry_are_refused(token):
+    """A token that could never match is refused before the server starts."""
+    with pytest.raises(ParameterError, match="the token has"):
+        ServerOptions(token=token)

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from spem.cli.options import CodesFile, Jobs
+from spem.cli.index import ModelName
+from spem.cli.labelled import Collection, load_labelled
+from spem.cli.options import Jobs
 from spem.cli.output import (
     check_folder,
     check_target,
@@ -31,10 +33,15 @@ REPORT = "report.html"
 
 
 def evaluate(
-    codes: CodesFile,
+    collection: Collection,
     labels: Annotated[
-        Path, typer.Option(metavar="FILE", help="Lines 'file,label', or a Princeton classification (.cla).")
-    ],
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Lines 'file,label', or a Princeton classification (.cla). [those of the index]",
+        ),
+    ] = None,
+    model: ModelName = None,
     rerank: Annotated[
         bool, typer.Option("--rerank", help="Score again after diffusion re-ranking, and tell both.")
     ] = False,
@@ -80,6 +87,7 @@ def evaluate(
     \b
     Examples:
       spem evaluate shapes.spem --labels shapes/labels.csv
+      spem evaluate shapes.db
       spem evaluate shapes.spem --labels test.cla --json scores.json --report report/
       spem evaluate shapes.spem --labels shapes/labels.csv --split 10 --repeats 20
       spem evaluate shapes.spem --labels some.csv --ignore-unlabelled --json -
@@ -96,31 +104,31 @@ def evaluate(
     from spem.retrieval.distances import correlation_distance
     from spem.retrieval.sizes import of_one_size
 
-    collection, classes = _load_labelled(codes, labels, ignore_unlabelled=ignore_unlabelled)
-    distances = correlation_distance(collection.vectors, collection.vectors)
-    candidates = None if matched_size is None else of_one_size(collection.volumes, matched_size)
+    codes, classes = load_labelled(collection, labels, model, ignore_unlabelled=ignore_unlabelled)
+    distances = correlation_distance(codes.vectors, codes.vectors)
+    candidates = None if matched_size is None else of_one_size(codes.volumes, matched_size)
     scores = score(distances, classes, candidates)
-    control = size_scores(collection, classes, candidates)
+    control = size_scores(codes, classes, candidates)
     facts = summary(scores, control)
     if matched_size is not None:
         facts["matched_size"] = matched_size
     if rerank:
         facts["after_diffusion"] = after_diffusion(distances, classes, candidates)
     if split is not None:
-        facts["classification"] = classification(collection, classes, split, repeats, seed)
+        facts["classification"] = classification(codes, classes, split, repeats, seed)
     _tell(facts, json)
     if report is not None:
         from spem.cli.report import write_collection_report
 
         page = write_collection_report(
             report / REPORT,
-            collection,
+            codes,
             classes,
             scores,
             distances=distances,
-            title=codes.stem,
+            title=Path(collection).stem,
             size_alone=control,
-            jobs=jobs or count_processes(len(collection)),
+            jobs=jobs or count_processes(len(codes)),
         )
         typer.echo(f"wrote {page}", err=to_stdout)
 
@@ -169,23 +177,6 @@ def classification(codes: Codes, classes: list[str], n_train: int, repeats: int,
     }
 
 
-def _load_labelled(path: Path, labels: Path, *, ignore_unlabelled: bool) -> tuple[Codes, list[str]]:
-    """Load codes with the class of each, and tell of labels that have no code."""
-    from spem.codes.codes import Codes
-    from spem.collections import row_keys
-    from spem.retrieval.labels import match_labels, read_labels, unused_labels
-
-    if path.is_dir():
-        msg = f"{path}: a folder; where it is an index: spem index export {path} codes.spem writes its codes"
-        raise ParameterError(msg)
-    codes, table = Codes.load(path), read_labels(labels)
-    unused = unused_labels(row_keys(codes), table)
-    if unused:
-        complain(f"{labels}: {counted(len(unused), 'label')} without a code, such as {unused[0]}")
-    kept = _labelled(codes, table) if ignore_unlabelled else codes
-    return kept, match_labels(row_keys(kept), table)
-
-
 def _tell(facts: dict[str, Any], json: Path | None) -> None:
     """Print the scores, or write them as JSON to standard output; and to a file where one is named."""
     if json is not None and str(json) == "-":
@@ -196,17 +187,6 @@ def _tell(facts: dict[str, Any], json: Path | None) -> None:
     print_scores(facts)
     if json is not None:
         typer.echo(f"wrote {json}")
-
-
-def _labelled(codes: Codes, table: dict[str, str]) -> Codes:
-    """Return the codes of the shapes that have a label, and tell how many have none."""
-    from spem.collections import row_keys
-    from spem.retrieval.labels import labelled
-
-    kept = codes.take(labelled(row_keys(codes), table))
-    if len(kept) < len(codes):
-        complain(f"{counted(len(codes) - len(kept), 'shape')} without a label left out")
-    return kept
 
 
 def score(

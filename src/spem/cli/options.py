@@ -92,7 +92,6 @@ Jobs = Annotated[
     int | None,
     typer.Option("--jobs", "-j", min=1, help="Number of processes. [by the number of shapes and of cores]"),
 ]
-CodesFile = Annotated[Path, typer.Argument(metavar="CODES", help="File that `spem encode` wrote.")]
 
 
 def check_device(device: str) -> None:

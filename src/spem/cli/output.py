@@ -146,10 +146,17 @@ def _plain(values: Any) -> Any:
 
 def print_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]], left: tuple[int, ...] = ()) -> None:
     """Write aligned columns to stdout: numbers to the right, the columns of `left` to the left."""
-    widths = [max(len(row[j]) for row in (header, *rows)) for j in range(len(header))]
-    for row in (header, *rows):
+    # a name may hold line ends, or what a terminal obeys
+    lines = [tuple(cell if cell.isprintable() else _escaped(cell) for cell in row) for row in (header, *rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    for row in lines:
         cells = (
             cell.ljust(width) if j in left else cell.rjust(width)
             for j, (cell, width) in enumerate(zip(row, widths, strict=True))
         )
         typer.echo("  ".join(cells).rstrip())
+
+
+def _escaped(text: str) -> str:
+    """Return text with what cannot be printed as escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -11,6 +12,7 @@ from numpy.random import RandomState
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
 from sklearn.cluster import KMeans
+from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from spem.errors import ParameterError
@@ -207,9 +209,12 @@ class Vocabulary(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # type
                 "give more shapes or ask for fewer centres"
             )
             raise ParameterError(msg)
-        kmeans = KMeans(
-            self.n_centers, n_init=self.n_init, max_iter=self.max_iter, random_state=self.random_state
-        ).fit(nodes)
+        with warnings.catch_warnings():
+            # equal nodes are fewer than centres, some of which are then equal too: as good a vocabulary
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            kmeans = KMeans(
+                self.n_centers, n_init=self.n_init, max_iter=self.max_iter, random_state=self.random_state
+            ).fit(nodes)
         self.cluster_centers_ = kmeans.cluster_centers_
         self.inertia_ = float(kmeans.inertia_)
         self.n_iter_ = int(kmeans.n_iter_)

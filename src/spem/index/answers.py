@@ -102,12 +102,15 @@ class Answers(Sequence[Found]):
         MissingExtraError
             When pandas is not installed.
         """
-        return require("pandas").DataFrame(self.to_dicts(), columns=_COLUMNS)
+        return require("pandas").DataFrame(self.to_dicts(), columns=[*_COLUMNS, "metadata"])
 
     def to_arrow(self) -> pyarrow.Table:
         """Return the answers as a table of Arrow."""
-        records = self.to_dicts()
-        return require("pyarrow").table({name: [one[name] for one in records] for name in _COLUMNS})
+        pyarrow, records = require("pyarrow"), self.to_dicts()
+        columns = {name: [one[name] for one in records] for name in _COLUMNS}
+        words = pyarrow.map_(pyarrow.string(), pyarrow.string())
+        metadata = pyarrow.array([list(one["metadata"].items()) for one in records], words)
+        return pyarrow.table(columns | {"metadata": metadata})
 
     def __repr__(self) -> str:
         rows = [_SHOWN, *self._cells()]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import platform
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
@@ -177,7 +178,7 @@ _END = object()
 @contextmanager
 def _connected(distributed: Any, address: str) -> Iterator[Any]:
     """Connect to a scheduler."""
-    if not address.startswith(("tcp://", "tls://")):
+    if not re.fullmatch(r"(tcp|tls)://[^/:]+:\d+|(tcp|tls)://\[[^/\]]+\]:\d+", address):
         msg = f"cluster {address}: expected the address of a Dask scheduler, such as tcp://host:8786"
         raise ClusterError(msg)
     with _silenced(logging.getLogger("distributed")):

@@ -78,7 +78,12 @@ def codes_of(store: Store, digest: str, where: str | None = None) -> Codes:
     ParameterError
         When a filter lets no row through.
     """
-    table = _read(store, digest, where, ("name", "path", "hash", "volume", "vector"))
+    return labelled_codes(store, digest, where)[0]
+
+
+def labelled_codes(store: Store, digest: str, where: str | None = None) -> tuple[Codes, list[str]]:
+    """Return codes as `codes_of` does, and the label of each, empty where there is none."""
+    table = _read(store, digest, where, ("name", "path", "hash", "volume", "vector", "label"))
     if not table.num_rows:
         of = f"model {digest}" + (f" where {where}" if where else "")
         msg = f"{store.address}: no shape of {of}, so there are no codes to write"
@@ -86,7 +91,8 @@ def codes_of(store: Store, digest: str, where: str | None = None) -> Codes:
     names, paths, hashes = (table.column(name).to_pylist() for name in ("name", "path", "hash"))
     volumes = table.column("volume").to_numpy()
     files = tuple(map(store.found, paths))
-    return Codes(names, files, hashes, _vectors(table), store.load_model(digest), volumes=volumes)
+    codes = Codes(names, files, hashes, _vectors(table), store.load_model(digest), volumes=volumes)
+    return codes, [label or "" for label in table.column("label").to_pylist()]
 
 
 def flat_table(

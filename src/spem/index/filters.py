@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from spem.errors import ParameterError
+from spem.errors import ParameterError, require_kind
 
 # Quoted text is passed over; outside of it metadata.key, metadata.'any key' and metadata."any key" are meant.
 _TOKENS = re.compile(
@@ -69,6 +69,7 @@ def to_sql(where: str) -> str:
     >>> to_sql("metadata.site = 'metadata.site' AND volume > 2")
     "map_extract(metadata, 'site')[1] = 'metadata.site' AND volume > 2"
     """
+    require_kind(where, str, "a filter is SQL, such as label = 'cat'")
     if not where.strip():
         msg = "where='': no filter of rows; leave it out, or write SQL such as label = 'cat'"
         raise ParameterError(msg)

@@ -89,9 +89,10 @@ def resolve(
 
 def _standardised(code: NDArray[Any], n_code: int) -> NDArray[np.float32]:
     """Return a code as the database has it, or refuse it."""
-    if code.shape != (n_code,) or not np.isfinite(code).all():
+    if code.shape != (n_code,) or code.dtype.kind not in "fiu" or not np.isfinite(code).all():
         msg = (
-            f"a code of shape {code.shape}, expected {n_code} finite numbers; make it with the index's model"
+            f"a code of {code.dtype} of shape {code.shape}, expected {n_code} finite numbers; "
+            "make it with the index's model"
         )
         raise ModelError(msg)
     return np.asarray(standardised_codes(code[None])[0])

@@ -13,7 +13,7 @@ from spem.errors import ModelError, ParameterError, ReadError
 from spem.index import updates
 from spem.index.annotations import annotated, labels_of
 from spem.index.checking import Finding, check
-from spem.index.exporting import codes_of, export
+from spem.index.exporting import codes_of, export, labelled_codes
 from spem.index.filters import literal
 from spem.index.models import ModelFacts
 from spem.index.row import Row
@@ -223,6 +223,12 @@ class Records:
     def codes(self, where: str | None = None, *, model: str | None = None) -> Codes:
         """Return the codes of rows, centred and of unit length, in order of name."""
         return codes_of(self.store, self.digest(model), where)
+
+    def labelled_codes(
+        self, where: str | None = None, *, model: str | None = None
+    ) -> tuple[Codes, list[str]]:
+        """Return codes as `codes` does, and the label of each, empty where there is none."""
+        return labelled_codes(self.store, self.digest(model), where)
 
     def export(
         self,

@@ -86,6 +86,9 @@ class Store:
         names = self._names()
         if MODELS not in names or not self._is_whole(MODELS):
             others = [name for name in names if name != MODELS]
+            if others and all(name.startswith(_CODES) for name in others):
+                msg = f"{self.address}: the table of models is gone or damaged; restore it from a copy"
+                raise ReadError(msg)
             if others:
                 msg = f"{self.address}: a database of other things ({others[0]}), not an index of spem"
                 raise ReadError(msg)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ FRESH = 2.0
 _SEEN = 0.5
 _THUMBNAILS = 4096
 _PAGES = 32
+# Models of which it is not known when they were made come last.
+_NEVER = datetime.max.replace(tzinfo=UTC)
 
 
 @dataclass(frozen=True)
@@ -64,25 +67,26 @@ class Catalogue:
         self._described: dict[str, tuple[str, int | None, int]] = {}
 
     def models(self) -> list[ModelEntry]:
-        """Return the models, the one of most shapes first."""
+        """Return the models, the one that was made first at the head."""
         return self._fresh.get("models", self._models)
 
     def _models(self) -> list[ModelEntry]:
         store, entries = self.index.store, []
-        for digest in store.digests():
+        made = {record["digest"]: record["made"] for record in store.model_records()}
+        for digest in sorted(store.digests(), key=lambda digest: (made.get(digest, _NEVER), digest)):
             if digest not in self._described:
                 model = store.load_model(digest)
                 self._described[digest] = (model.settings.features, model.ndim, model.n_code)
             features, ndim, n_code = self._described[digest]
             count = int(store.table(digest).count_rows())
             entries.append(ModelEntry(digest, features, ndim, count, n_code))
-        return sorted(entries, key=lambda entry: (-entry.n_shapes, entry.digest))
+        return entries
 
     def digest(self, wanted: str | None, key: str | None = None) -> str:
         """Return the digest of the model that is asked for.
 
-        Where none is, that of the model with most shapes, of those that have a row where its id is given:
-        which model has most changes while shapes are added, and addresses of shapes stay.
+        Where none is, the first that the index had, so that additions do not change it; of an id, the first
+        that has such a row.
 
         Raises
         ------

@@ -82,6 +82,9 @@ class ServerOptions:
         if not 0 <= self.port <= _LARGEST_PORT:
             msg = f"port={self.port}: expected 0 to {_LARGEST_PORT}"
             raise ParameterError(msg)
+        if self.token is not None and not (self.token.isascii() and self.token.isprintable()):
+            msg = "the token has characters that no header carries; expected ASCII on one line"
+            raise ParameterError(msg)
         if self.token is not None and len(self.token) < _LEAST_TOKEN:
             msg = f"the token has {len(self.token)} characters; expected {_LEAST_TOKEN} or more"
             raise ParameterError(msg)

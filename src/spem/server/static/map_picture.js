@@ -77,8 +77,8 @@ export class MapPicture {
     this.size();
     this.placed = this.inView();
     const pictured = this.pictures ? this.pictured() : new Set();
-    for (const spot of this.placed) if (!pictured.has(spot)) this.dot(context, spot);
     for (const spot of pictured) this.paintPicture(context, spot);
+    for (const spot of this.placed) if (!pictured.has(spot)) this.dot(context, spot);
     const spot = this.marked && this.placed.find(({ point }) => point === this.marked);
     if (spot) this.ring(context, spot);
   }
@@ -111,22 +111,21 @@ export class MapPicture {
     return roomy;
   }
 
-  /** The points that have a square of this side about them nearly to themselves. */
+  /** Points whose squares of this side nearly do not overlap, one after the other; the dots of others lie on top. */
   roomy(side) {
     const cells = new Map();
     const key = (px, py) => Math.floor(px / side) * 4096 + Math.floor(py / side);
-    for (const spot of this.placed) {
-      const at = key(spot.px, spot.py);
-      if (cells.has(at)) cells.get(at).push(spot);
-      else cells.set(at, [spot]);
-    }
     const steps = [-side, 0, side].flatMap((dx) => [-side, 0, side].map((dy) => [dx, dy]));
     const near = ({ px, py }) => steps.flatMap(([dx, dy]) => cells.get(key(px + dx, py + dy)) ?? []);
     const apart = (a, b) => Math.max(Math.abs(a.px - b.px), Math.abs(a.py - b.py));
     const roomy = new Set();
     for (const spot of this.placed) {
       if (roomy.size >= MOST_PICTURES) break;
-      if (near(spot).every((other) => other === spot || apart(spot, other) > 0.9 * side)) roomy.add(spot);
+      if (near(spot).some((other) => apart(spot, other) <= 0.9 * side)) continue;
+      roomy.add(spot);
+      const at = key(spot.px, spot.py);
+      if (cells.has(at)) cells.get(at).push(spot);
+      else cells.set(at, [spot]);
     }
     return roomy;
   }
