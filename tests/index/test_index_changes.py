@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spem.index.changes import Known, place, plan
+from spem.index.row import UPLOADED
 from spem.shapes.shape import Shape
 
 
@@ -95,3 +96,9 @@ def test_plan_applied_gives_what_the_files_hold(before: list[tuple[str, str]], n
     again = plan([Known(key, tuple(paths)) for key, paths in rows.items() if paths], sources)
     assert again.n_unchanged == len(sources)
     assert [dict(again.encode), dict(again.gained), dict(again.lost)] == [{}, {}, {}]
+
+
+def test_uploads_are_no_files_that_could_be_gone() -> None:
+    """What came over the network lies nowhere, so following a folder does not drop it."""
+    known = [Known("1", (f"{UPLOADED}9f/cat.obj",)), Known("2", ("gone.obj",))]
+    assert dict(plan(known, [], prune=["."]).lost) == {"2": ("gone.obj",)}

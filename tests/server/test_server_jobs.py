@@ -128,6 +128,18 @@ def test_the_queue_is_bounded(start: Callable[..., Jobs]) -> None:
     assert jobs.stats()["queued"] == 2
 
 
+def test_one_client_gets_half_of_the_queue(start: Callable[..., Jobs]) -> None:
+    """Who has filled his half is told to wait; others still have room."""
+    jobs = start(queue=4)
+    running(jobs, jobs.submit("encode", HEADER, b"file", "192.0.2.1"))
+    for _ in range(2):
+        jobs.submit("encode", HEADER, b"file", "192.0.2.1")
+    with pytest.raises(QueueFullError, match="2 jobs wait already"):
+        jobs.submit("encode", HEADER, b"file", "192.0.2.1")
+    jobs.submit("encode", HEADER, b"file", "192.0.2.2")
+    assert jobs.stats()["queued"] == 3
+
+
 def test_jobs_are_cancelled_wherever_they_are(start: Callable[..., Jobs], tmp_path: Path) -> None:
     """A running job stops its task, a waiting one leaves the queue; the files of both go."""
     jobs = start()

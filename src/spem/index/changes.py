@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from spem.codes.sources import Source, source_path
 from spem.index.filters import as_text
-from spem.shapes.kinds import SUFFIXES, has_suffix
+from spem.index.row import names_file
 from spem.shapes.shape import Shape
 
 _T = TypeVar("_T")
@@ -151,8 +151,7 @@ def _gone(
     for content, known in places.items() if roots else ():
         for where, path in known.items():
             file = Path(where)
-            # a shape that was no file has its name for a path
-            below = has_suffix(file, SUFFIXES) and any(file.is_relative_to(root) for root in roots)
+            below = names_file(path) and any(file.is_relative_to(root) for root in roots)
             if below and where not in seen and not file.exists():
                 yield content, path
 

@@ -14,10 +14,9 @@ from spem.errors import ReadError, SpemError
 from spem.index import updates
 from spem.index.database_errors import brief, told
 from spem.index.filters import literal
-from spem.index.row import ID_DIGITS, unpack
+from spem.index.row import ID_DIGITS, names_file, unpack
 from spem.index.schema import HEAVY, LIGHT, layout_of
 from spem.index.store import Store
-from spem.shapes.kinds import SUFFIXES, has_suffix
 
 # A code of unit length is one to this, in float32.
 _UNIT = 1e-4
@@ -148,8 +147,7 @@ def _repair(store: Store, digest: str, findings: list[Finding]) -> None:
 def _check_files(store: Store, digest: str) -> Iterator[Finding]:
     """Yield the files of rows that are gone or hold something else."""
     for known in updates.known(store, digest):
-        # a shape that was no file has its name for a path
-        for path in (path for path in known.paths if has_suffix(Path(path), SUFFIXES)):
+        for path in filter(names_file, known.paths):
             if not Path(path).exists():
                 yield Finding(path, "no such file any more; --prune of spem index add removes its row")
                 continue

@@ -47,13 +47,18 @@ def models_for(query: Any, store: Store, models: Sequence[ModelFacts]) -> list[s
         return [model.digest for model in models if store.count(model.digest, where)]
     key = literal(file_hash(file)[:ID_DIGITS])
     holding = [model.digest for model in models if store.count(model.digest, f"id = {key}")]
-    return holding or [model.digest for model in models if model.ndim in (0, *_dimensions(file, models))]
+    ndims = file_dimensions(file)
+    return holding or [model.digest for model in models if not ndims or model.ndim in (0, *ndims)]
 
 
-def _dimensions(file: Path, models: Sequence[ModelFacts]) -> set[int]:
-    """Return the dimensions that the shape of a file may have, by its kind."""
+def file_dimensions(file: Path) -> tuple[int, ...]:
+    """Return the dimension that the shape of a file has by its kind, nothing where the kind does not tell.
+
+    Examples
+    --------
+    >>> file_dimensions(Path("cat.obj")), file_dimensions(Path("scan.nii.gz"))
+    ((3,), ())
+    """
     if has_suffix(file, MESH_SUFFIXES):
-        return {3}
-    if has_suffix(file, IMAGE_SUFFIXES) and not has_suffix(file, TIFF_SUFFIXES):
-        return {2}
-    return {model.ndim for model in models}
+        return (3,)
+    return (2,) if has_suffix(file, IMAGE_SUFFIXES) and not has_suffix(file, TIFF_SUFFIXES) else ()

@@ -183,7 +183,9 @@ def _connected(distributed: Any, address: str) -> Iterator[Any]:
         raise ClusterError(msg)
     with _silenced(logging.getLogger("distributed")):
         try:
-            client = distributed.Client(address, timeout=CONNECT, set_as_default=False)
+            client = distributed.Client(
+                address, timeout=CONNECT, set_as_default=False, direct_to_workers=True
+            )
         except (TimeoutError, OSError, ValueError, TypeError) as error:
             msg = f"{address}: no Dask scheduler answers there; start one with: dask scheduler"
             raise ClusterError(msg) from error

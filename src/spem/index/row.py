@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,11 +17,14 @@ from numpy.typing import NDArray
 
 from spem.errors import ReadError, SpemError
 from spem.files import DAMAGE
+from spem.shapes.kinds import SUFFIXES, has_suffix
 from spem.shapes.packing import pack_shape, unpack_shape
 from spem.shapes.shape import Shape
 
 # Hex digits of the content hash that tell rows apart: 80 bits, so that 10^9 shapes collide with odds of 1e-6.
 ID_DIGITS = 20
+# Before the path of what came as an upload, which lies nowhere.
+UPLOADED = "upload:"
 # Steps of an edge that a cut is kept to: one half, where nothing is known of a cut, is one of them.
 _STEPS = 2**12
 
@@ -77,6 +81,17 @@ class Row:
     thumbnail: bytes = b""
     shape: bytes = b""
     added: datetime = field(default_factory=lambda: datetime.now(UTC))
+
+
+def names_file(path: str) -> bool:
+    """Tell whether the path of a row is that of a file: not the name of a shape, nor of an upload.
+
+    Examples
+    --------
+    >>> names_file("shapes/cat.obj"), names_file("disk"), names_file(f"{UPLOADED}9f/cat.obj")
+    (True, False, False)
+    """
+    return has_suffix(Path(path), SUFFIXES) and not path.startswith(UPLOADED)
 
 
 def row_id(content_hash: str, suffix: str = "") -> str:

@@ -18,7 +18,7 @@ from spem.index.database_errors import told
 from spem.index.extra import require
 from spem.index.filters import as_text, literal, to_sql
 from spem.index.locking import one_writer
-from spem.index.row import Row
+from spem.index.row import UPLOADED, Row
 from spem.index.schema import LAYOUT, LIGHT, layout_of, models_schema, schema, to_row
 
 MODELS = "models"
@@ -273,6 +273,8 @@ class Store:
 
     def stored(self, path: str) -> str:
         """Return a path as the table has it: from the folder of the index, absolute on object storage."""
+        if path.startswith(UPLOADED):
+            return as_text(path)
         if self.folder is not None:
             return as_text(stored_path(path, self.folder))
         return as_text(str(Path(path).absolute()) if Path(path).exists() else path)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from spem.index.choosing import file_dimensions
 from spem.index.index import Index
 from spem.index.row import Row
 from spem.index.schema import LIGHT, standardised_codes
@@ -102,6 +104,18 @@ class Catalogue:
         if not is_digest(wanted) or wanted not in (entry.digest for entry in self.models()):
             raise Refusal(404, "no such model; /api/info lists the models")
         return wanted
+
+    def digest_for(self, wanted: str | None, name: str) -> str:
+        """Return the digest of the model that is asked for, or of the first that takes such files.
+
+        Raises
+        ------
+        Refusal
+            When there is no such model.
+        """
+        models = self.models()
+        ndims = file_dimensions(Path(name)) if wanted is None else ()
+        return next((entry.digest for entry in models if entry.ndim in ndims), None) or self.digest(wanted)
 
     def _has(self, digest: str, key: str | None) -> bool:
         """Tell whether a model has a row of this id."""

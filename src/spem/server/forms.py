@@ -6,7 +6,7 @@ import asyncio
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fastapi import Request
 from python_multipart.multipart import parse_options_header
@@ -39,11 +39,14 @@ class Form:
         Its bytes.
     fields
         What else the form has.
+    client
+        Who sent it.
     """
 
     name: str
     payload: bytes
     fields: dict[str, str]
+    client: str = ""
 
     def whole(self, name: str, default: int, least: int, most: int) -> int:
         """Return a field that is a whole number.
@@ -126,7 +129,7 @@ class Forms:
         self._inside[client] += 1
         try:
             async with asyncio.timeout(_SECONDS):
-                return await _received(request)
+                return replace(await _received(request), client=client)
         except TimeoutError as error:
             msg = f"the body did not come within {_SECONDS:g} s"
             raise Refusal(408, msg, {"Connection": "close"}) from error

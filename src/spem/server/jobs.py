@@ -91,7 +91,7 @@ class Jobs:
         for thread in self._threads:
             thread.start()
 
-    def submit(self, kind: str, header: Mapping[str, Any], payload: bytes) -> str:
+    def submit(self, kind: str, header: Mapping[str, Any], payload: bytes, client: str = "") -> str:
         """Queue a file.
 
         Parameters
@@ -103,6 +103,8 @@ class Jobs:
             the step of this kind needs: values that `json` can write.
         payload
             The bytes of the file.
+        client
+            Who sent it; one client gets half of the queue at most.
 
         Returns
         -------
@@ -119,10 +121,10 @@ class Jobs:
         if kind not in self._steps:
             msg = f"no job of kind {kind!r}; expected one of {', '.join(self._steps)}"
             raise ParameterError(msg)
-        job = Job(secrets.token_hex(_ID_BYTES), kind, dict(header), time.time())
+        job = Job(secrets.token_hex(_ID_BYTES), kind, dict(header), time.time(), client=client)
         self._sweep()
         with self._changed:
-            self._check_room()
+            self._check_room(client)
             # holds its place while the file is written
             self._jobs[job.id] = job
             self._waiting.append(job.id)
@@ -362,12 +364,13 @@ class Jobs:
             if job.state == "running":
                 self._jobs[job_id] = job.with_(stage=stage, progress=share)
 
-    def _check_room(self) -> None:
-        """Refuse another job when too many wait, or the server goes down."""
+    def _check_room(self, client: str) -> None:
+        """Refuse another job when too many wait, or too many of one client, or the server goes down."""
         if self._closing:
             msg = "the server is going down; try again later"
             raise QueueFullError(msg, _GUESS)
-        if len(self._waiting) >= self._queue_length:
+        of_client = sum(self._jobs[key].client == client for key in self._waiting) if client else 0
+        if len(self._waiting) >= self._queue_length or 2 * of_client >= self._queue_length:
             msg = f"{len(self._waiting)} jobs wait already; try again later"
             raise QueueFullError(msg, self._mean_seconds * len(self._waiting) / max(1, len(self._threads)))
 

@@ -95,7 +95,7 @@ async def remove(live: Live, id: ShapeId, authorization: Token = None, model: Mo
 
 def _remove(live: Services, model: str | None, key: str) -> int:
     """Remove a row."""
-    digest = live.catalogue.digest(model)
+    digest = live.catalogue.digest(model, key)
     live.catalogue.row(digest, key)
     removed = live.catalogue.index.remove(key, model=digest)
     live.catalogue.changed()
@@ -129,10 +129,10 @@ async def _submitted(
     live: Services, kind: str, model: str | None, form: Form, wanted: dict[str, Any]
 ) -> Response:
     """Queue a job."""
-    digest = await live.reads.run(live.catalogue.digest, model)
+    digest = await live.reads.run(live.catalogue.digest_for, model, form.name)
     header = {"name": form.name, "model": digest, "voxels": live.options.voxels, **wanted}
     try:
-        job = await live.reads.run(live.jobs.submit, kind, header, form.payload)
+        job = await live.reads.run(live.jobs.submit, kind, header, form.payload, form.client)
     except QueueFullError as error:
         raise Busy(str(error), error.seconds) from error
     return json_reply({"job": job}, 202)

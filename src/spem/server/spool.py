@@ -48,6 +48,8 @@ class Job:
         One line, where it failed.
     result
         What the client gets, where it is done.
+    client
+        Who sent it, where that is known.
     """
 
     id: str
@@ -62,6 +64,7 @@ class Job:
     attempts: int = 0
     error: str = ""
     result: Mapping[str, Any] | None = field(default=None, repr=False)
+    client: str = field(default="", repr=False)
 
     def with_(self, **changes: Any) -> Job:
         """Return the job with changes."""

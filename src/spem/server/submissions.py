@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from spem.errors import ReadError
-from spem.index.row import Row
+from spem.index.row import UPLOADED, Row
 from spem.server.cards import card, full_card, ranking
 from spem.server.catalogue import Catalogue
 from spem.server.refusals import Refusal
@@ -84,7 +84,7 @@ class Submissions:
         header, index = job.header, self._catalogue.index
         fields = {"label": header["label"], "metadata": header["metadata"]}
         # No path of this host: two files of one name are two, and none is looked for.
-        written = [replace(row, path=f"upload:{row.hash[:12]}/{row.path}", **fields) for row in rows]
+        written = [replace(row, path=f"{UPLOADED}{row.hash[:12]}/{row.path}", **fields) for row in rows]
         index.store.write(written, index.model(header["model"]))
         self._catalogue.changed()
         told = {"shape": card(written[0]), "model": header["model"]}
