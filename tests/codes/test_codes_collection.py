@@ -319,3 +319,16 @@ def test_volumes_are_kept_in_the_unit_of_the_file(tmp_path):
     np.testing.assert_allclose(reused.volumes, codes.volumes)
     whole = Settings(features="spem", voxels=None, n_maps=2, n_centers=4, per_label=False)
     assert encode_collection([tmp_path / "seg.npz"], whole).names == ("seg",)
+
+
+def test_workers_follow_the_working_directory(tmp_path, monkeypatch):
+    """Relative paths start from where the caller is, also for workers that an earlier call has left."""
+    for name in ("one", "two"):
+        folder = tmp_path / name
+        folder.mkdir()
+        for i in range(3):
+            np.save(folder / f"{name}{i}.npy", np.ones((9 + i, 9)))
+        monkeypatch.chdir(folder)
+        files = [Path(f"{name}{i}.npy") for i in range(3)]
+        settings = Settings(features="spem", voxels=None, n_maps=2, n_centers=4)
+        assert len(encode_collection(files, settings, n_jobs=2)) == 3

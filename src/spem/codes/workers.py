@@ -7,7 +7,9 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from functools import cache
+from pathlib import Path
 from typing import TypeVar
 
 from joblib import Parallel, delayed, parallel_config
@@ -116,12 +118,18 @@ def _spread(work: Callable[[T], R], tasks: dict[int, T], n_jobs: int) -> Iterato
     """Run tasks in processes of one thread each; results come in the order in which they are done."""
     with parallel_config(backend="loky", inner_max_num_threads=1):
         pool = Parallel(n_jobs=n_jobs, return_as="generator_unordered", max_nbytes=None)
-        yield from pool(delayed(_in_process)(work, index, task) for index, task in list(tasks.items()))
+        place = ""
+        with suppress(FileNotFoundError):  # a folder may be removed while one is in it
+            place = str(Path.cwd())
+        yield from pool(delayed(_in_process)(work, index, task, place) for index, task in list(tasks.items()))
 
 
-def _in_process(work: Callable[[T], R], index: int, task: T) -> tuple[int, R | None, str]:
+def _in_process(work: Callable[[T], R], index: int, task: T, place: str) -> tuple[int, R | None, str]:
     """Run one task in a worker. Ctrl-C reaches all processes; the parent ends the workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # workers outlive a call, and relative paths start from where the caller is now
+    with suppress(OSError):
+        os.chdir(place)
     _follow_parent()
     return index, *_attempt(work, task)
 

@@ -118,6 +118,7 @@ async function draw(moved) {
   main.replaceChildren(root);
   try {
     const render = await found.open();
+    if (ticket !== turn) return;
     const page = await render(root, found.parameters, readState(), setState);
     if (ticket === turn) current.page = page ?? null;
     else page?.destroy?.();
