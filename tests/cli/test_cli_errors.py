@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -180,3 +182,22 @@ def test_every_public_name_resolves() -> None:
     assert list(package.__all__) == sorted(package.__all__)
     for name in package.__all__:
         assert getattr(package, name) is not None
+
+
+def test_an_interrupt_while_text_is_executed_ends_with_its_status() -> None:
+    """As while a dataclass is made: the status is 130, not death by the signal."""
+    script = """
+import signal, sys
+from spem.cli.app import app, guarded
+
+def command() -> None:
+    exec("import signal; signal.raise_signal(signal.SIGINT)")
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+app.command("stop")(guarded(command))
+sys.argv = ["spem", "stop"]
+app()
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 130, done.stderr
+    assert done.stderr == "spem: interrupted\n"

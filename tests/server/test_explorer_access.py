@@ -140,7 +140,8 @@ def test_page_that_was_left_changes_nothing(tabs):
     page = tabs.open()
     held = []
     page.route("**/api/shapes/*", lambda route: held.append(route))
-    page.locator("a.card").first.click()
+    with page.expect_request("**/api/shapes/*"):
+        page.locator("a.card").first.click()
     expect(page.locator(".page-shape")).to_be_attached()
     page.get_by_role("link", name="Map", exact=True).click()
     expect(page).to_have_title("Map · spem")

@@ -140,6 +140,7 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
             raise typer.Exit(DONE) from None
         except KeyboardInterrupt as stop:
             complain(str(stop) or "interrupted")
+            _forget_interrupt()
             raise typer.Exit(INTERRUPTED) from None
         except SizeError as error:
             _refuse(
@@ -155,6 +156,15 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
             )
 
     return command
+
+
+def _forget_interrupt() -> None:
+    """Let the process end with a status of its own.
+
+    CPython marks an interrupt that comes while text is executed, as dataclasses do at import, as unhandled,
+    and would end the process by the signal; the next text that is executed takes the mark away.
+    """
+    exec("")  # noqa: S102
 
 
 def _refuse(message: str) -> None:
