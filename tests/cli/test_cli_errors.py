@@ -184,7 +184,7 @@ def test_every_public_name_resolves() -> None:
         assert getattr(package, name) is not None
 
 
-def test_an_interrupt_while_text_is_executed_ends_with_its_status() -> None:
+def test_an_interrupt_while_text_is_executed_ends_with_its_status(tmp_path: Path) -> None:
     """As while a dataclass is made: the status is 130, not death by the signal."""
     script = """
 import signal, sys
@@ -198,6 +198,8 @@ app.command("stop")(guarded(command))
 sys.argv = ["spem", "stop"]
 app()
 """
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    (tmp_path / "stopped.py").write_text(script)
+    command = [sys.executable, "-m", "stopped"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 130, done.stderr
     assert done.stderr == "spem: interrupted\n"
