@@ -93,13 +93,7 @@ def evaluate(
       spem evaluate shapes.spem --labels some.csv --ignore-unlabelled --json -
     """  # noqa: D301
     to_stdout = json is not None and str(json) == "-"
-    if json is not None and not to_stdout:
-        check_target(json)
-    if report is not None:
-        if matched_size is not None:
-            msg = "--report is a page on the whole collection; leave out --matched-size or --report"
-            raise ParameterError(msg)
-        check_folder(report)
+    _check_targets(None if to_stdout else json, report, whole=matched_size is None)
     from spem.codes.workers import count_processes
     from spem.retrieval.distances import correlation_distance
     from spem.retrieval.sizes import of_one_size
@@ -131,6 +125,17 @@ def evaluate(
             jobs=jobs or count_processes(len(codes)),
         )
         typer.echo(f"wrote {page}", err=to_stdout)
+
+
+def _check_targets(json: Path | None, report: Path | None, *, whole: bool) -> None:
+    """Refuse files that cannot be written, and a report on less than the whole collection."""
+    if json is not None:
+        check_target(json)
+    if report is not None:
+        if not whole:
+            msg = "--report is a page on the whole collection; leave out --matched-size or --report"
+            raise ParameterError(msg)
+        check_folder(report)
 
 
 def after_diffusion(

@@ -232,7 +232,7 @@ class Index(Records):
             When the index has no such model.
         """
         digest = self.digest(model)
-        count = super().drop(digest)
+        count = self.store.drop_model(digest)
         self.snapshots.forget(digest)
         return count
 

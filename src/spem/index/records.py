@@ -163,16 +163,6 @@ class Records:
             return updates.remove_where(self.store, digest, where)
         return updates.remove(self.store, digest, [ids] if isinstance(ids, str) else list(ids or ()))
 
-    def drop(self, model: str | Model) -> int:
-        """Remove a model with all of its rows, and return how many there were.
-
-        Raises
-        ------
-        ModelError
-            When the index has no such model.
-        """
-        return self.store.drop_model(self.digest(model))
-
     def annotate(
         self,
         ids: str | Sequence[str] | None = None,

@@ -17,7 +17,7 @@ from spem.errors import ParameterError, QueueFullError, ReadError, SandboxError,
 from spem.index.index import Index
 from spem.index.row import Row
 from spem.server.sandbox import Sandbox
-from spem.server.spool import OVER, Job, Spool
+from spem.server.spool import OVER, Job, Spool, expired
 
 # What becomes, in the server, of the rows that a worker made: the result that the client gets.
 Step: TypeAlias = Callable[[Job, list[Row]], dict[str, Any]]
@@ -377,12 +377,9 @@ class Jobs:
     def _sweep(self) -> None:
         """Forget jobs that were finished long ago, and the oldest of too many."""
         with self._changed:
-            over = [job for job in self._jobs.values() if job.state in OVER]
-        over.sort(key=lambda job: job.finished, reverse=True)
-        limit = time.time() - self._keep_seconds
-        for place, job in enumerate(over):
-            if place >= self._keep or job.finished < limit:
-                self._forget(job.id)
+            jobs = list(self._jobs.values())
+        for job in expired(jobs, self._keep, time.time() - self._keep_seconds):
+            self._forget(job.id)
 
     def _forget(self, job_id: str) -> None:
         """Remove a job from memory and from the spool."""

@@ -71,6 +71,12 @@ class Job:
         return replace(self, **changes)
 
 
+def expired(jobs: Sequence[Job], keep: int, before: float) -> list[Job]:
+    """Return the jobs that are over and were finished before a time, or are older than the latest to keep."""
+    over = sorted((job for job in jobs if job.state in OVER), key=lambda job: job.finished, reverse=True)
+    return [job for place, job in enumerate(over) if place >= keep or job.finished < before]
+
+
 def _job(file: Path) -> Job | None:
     """Read the record of a job, or None where it is damaged."""
     try:
