@@ -235,13 +235,13 @@ def test_stopped_encode_goes_on(start: Start, spem: Spem, tmp_path: Path) -> Non
     with start("encode", shapes, "-o", target, *options) as first:
         _wait_for(work, 5, first)
         os.kill(first.pid, signal.SIGKILL)
-        first.communicate(timeout=30)
+        first.communicate(timeout=60)
     done = len(list(work.rglob("[0-9a-f]*.work")))
     assert 5 <= done < N_MANY
     with start("encode", shapes, "-o", target, *options) as second:
         _wait_for(work, done + 5, second)
         os.killpg(second.pid, signal.SIGINT)
-        _, said = second.communicate(timeout=30)
+        _, said = second.communicate(timeout=60)
     assert second.returncode == 130
     assert "done already; going on" in said
     assert "give the same command again" in said

@@ -8,7 +8,6 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 from typing import TypeVar
 
@@ -116,7 +115,9 @@ def _alone(work: Callable[[T], R], tasks: dict[int, T], index: int) -> tuple[R |
 
 def _spread(work: Callable[[T], R], tasks: dict[int, T], n_jobs: int) -> Iterator[tuple[int, R | None, str]]:
     """Run tasks in processes of one thread each; results come in the order in which they are done."""
-    with parallel_config(backend="loky", inner_max_num_threads=1):
+    # Each process follows its parent from its start: one that is still starting when the parent dies ends too.
+    follow = {"initializer": _follow_parent, "initargs": (os.getpid(),)}
+    with parallel_config(backend="loky", inner_max_num_threads=1, **follow):
         pool = Parallel(n_jobs=n_jobs, return_as="generator_unordered", max_nbytes=None)
         place = ""
         with suppress(FileNotFoundError):  # a folder may be removed while one is in it
@@ -130,14 +131,11 @@ def _in_process(work: Callable[[T], R], index: int, task: T, place: str) -> tupl
     # workers outlive a call, and relative paths start from where the caller is now
     with suppress(OSError):
         os.chdir(place)
-    _follow_parent()
     return index, *_attempt(work, task)
 
 
-@cache
-def _follow_parent() -> None:
-    """Once in a process: watch the parent, and end when it is gone, since nobody waits for the results."""
-    parent = os.getppid()
+def _follow_parent(parent: int) -> None:
+    """Watch the process that started this one, and end when it is gone: nobody waits for the results."""
 
     def watch() -> None:
         while os.getppid() == parent:
