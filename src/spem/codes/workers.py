@@ -115,7 +115,7 @@ def _alone(work: Callable[[T], R], tasks: dict[int, T], index: int) -> tuple[R |
 
 def _spread(work: Callable[[T], R], tasks: dict[int, T], n_jobs: int) -> Iterator[tuple[int, R | None, str]]:
     """Run tasks in processes of one thread each; results come in the order in which they are done."""
-    # Each process follows its parent from its start: one that is still starting when the parent dies ends too.
+    # Each follows its parent from its start: one that is still starting when the parent dies ends too.
     follow = {"initializer": _follow_parent, "initargs": (os.getpid(),)}
     with parallel_config(backend="loky", inner_max_num_threads=1, **follow):
         pool = Parallel(n_jobs=n_jobs, return_as="generator_unordered", max_nbytes=None)

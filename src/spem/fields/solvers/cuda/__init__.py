@@ -1,0 +1,1 @@
+"""The sweep's engine on a CUDA device."""

@@ -1,0 +1,133 @@
+"""What a backend brings to the sweep: block vectors of a batch of systems, and the kernels on them.
+
+The sweep itself, its stopping rule, its poles and its small dense algebra are written once, over engines. An
+engine holds for each node of each system of its batch eight numbers, one a lane, in a few vectors:
+
+- u, the prediction of the reduced basis, in double precision;
+- r, a residual, z, what one V-cycle of multigrid makes of it, x, p and q of conjugate gradients, all in single;
+- the blocks of the basis, eight columns each, in single or double precision.
+
+What passes between an engine and the sweep are small float64 arrays of the host with the system first:
+``(n_systems, LANES)``, or ``(n_systems, K, LANES)`` where K = LANES · n_blocks counts columns of the basis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.fields.operator import System
+
+LANES = 8
+
+Small = NDArray[np.float64]
+
+
+class Products(NamedTuple):
+    """What a new block of columns C has with all columns B of the basis, itself last, in double precision.
+
+    Parameters
+    ----------
+    gram, stiffness, mass
+        ``(n_systems, K, LANES)`` BᵀC, BᵀAC and BᵀMC, A in units of `Engine.units`.
+    sums, source
+        ``(n_systems, LANES)`` 1ᵀC and 1ᵀMC.
+    """
+
+    gram: Small
+    stiffness: Small
+    mass: Small
+    sums: Small
+    source: Small
+
+
+class Engine(Protocol):
+    """Block vectors of a batch of systems of the same dimension.
+
+    The answers for a system do not depend on what else is in the batch, bit by bit, and reductions are in
+    double precision, in an order that depends on the system alone.
+    """
+
+    #: ``(n_systems,)`` number of nodes of each system.
+    counts: NDArray[np.int64]
+    #: ``(n_systems,)`` the length that A is scaled by: the least spacing of each system.
+    units: Small
+    #: Precision of the columns of the basis.
+    dtype: type[np.floating[Any]]
+
+    def measure(self, mix: Small, shifts: Small, active: NDArray[np.bool_]) -> tuple[Small, Small]:
+        """Set u = B·mix, r = s M (1 − u) − A u in double precision, and z to a cycle's answer to r.
+
+        Parameters
+        ----------
+        mix
+            ``(n_systems, K, LANES)`` coefficients of the predictions.
+        shifts
+            ``(n_systems, LANES)`` s of each lane, in units of 1/`units`².
+        active
+            ``(n_systems,)`` the systems to work on, until the next call; the answers for others are zero.
+
+        Returns
+        -------
+        tuple
+            r·z and the largest \\|z\\|, ``(n_systems, LANES)`` each.
+        """
+        ...
+
+    def search(self, beta: Small | None) -> Small:
+        """Turn the search directions, p ← z + β p, set q = (A + s M) p, and return p·q.
+
+        With None conjugate gradients start afresh: x = 0 and p = z.
+        """
+        ...
+
+    def improve(self, alpha: Small) -> Small:
+        """Advance, x ← x + α p and r ← r − α q, set z to a cycle's answer to r, and return r·z."""
+        ...
+
+    def overlaps(self) -> Small:
+        """Return inner products ``(n_systems, K + LANES, LANES)`` of the basis, and of x itself last, with x."""
+        ...
+
+    def append(self, mix: Small, remove: Small) -> Products:
+        """Append the block x·mix + B·remove to the basis.
+
+        Parameters
+        ----------
+        mix
+            ``(n_systems, LANES, LANES)``; zero for systems that are not active.
+        remove
+            ``(n_systems, K, LANES)``.
+        """
+        ...
+
+    def columns(self, turn: Sequence[Small]) -> list[NDArray[np.floating[Any]]]:
+        """Return the columns B·turn of each system, ``(n_nodes, rank)`` in node order, on the host.
+
+        Parameters
+        ----------
+        turn
+            For each system ``(K, rank)``.
+        """
+        ...
+
+    def close(self) -> None:
+        """Give back threads and memory; nothing may be asked for afterwards."""
+        ...
+
+
+class Backend(Protocol):
+    """Where a sweep runs."""
+
+    def open(self, systems: Sequence[System], dtype: type[np.floating[Any]]) -> Engine:
+        """Make an engine for systems of one dimension.
+
+        Raises
+        ------
+        SizeError
+            When they do not fit into its memory; half of them, or one, may.
+        """
+        ...
