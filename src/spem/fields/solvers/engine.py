@@ -4,7 +4,7 @@ The sweep itself, its stopping rule, its poles and its small dense algebra are w
 engine holds for each node of each system of its batch eight numbers, one a lane, in a few vectors:
 
 - u, the prediction of the reduced basis, in double precision;
-- r, a residual, z, what one V-cycle of multigrid makes of it, x, p and q of conjugate gradients, all in single;
+- r, a residual, z, what one V-cycle of multigrid makes of it, x, p and q of conjugate gradients, in single;
 - the blocks of the basis, eight columns each, in single or double precision.
 
 What passes between an engine and the sweep are small float64 arrays of the host with the system first:
@@ -73,7 +73,7 @@ class Engine(Protocol):
         Returns
         -------
         tuple
-            r·z and the largest \\|z\\|, ``(n_systems, LANES)`` each.
+            r·z and the largest magnitude of z, ``(n_systems, LANES)`` each.
         """
         ...
 
@@ -89,7 +89,7 @@ class Engine(Protocol):
         ...
 
     def overlaps(self) -> Small:
-        """Return inner products ``(n_systems, K + LANES, LANES)`` of the basis, and of x itself last, with x."""
+        """Return inner products ``(n_systems, K + LANES, LANES)`` of the basis, then of x itself, with x."""
         ...
 
     def append(self, mix: Small, remove: Small) -> Products:
@@ -119,10 +119,37 @@ class Engine(Protocol):
         ...
 
 
+class SourceEngine(Engine, Protocol):
+    """An engine that takes right-hand sides other than s M·1, and refines their solutions v."""
+
+    def load(self, rhs: Sequence[NDArray[np.float64]]) -> Small:
+        """Take right-hand sides b, for each system ``(n_nodes, LANES)``; v = x = 0; return b·b.
+
+        The values of b are kept, and v held, in double precision; the blocks of a basis are not touched.
+        """
+        ...
+
+    def refine(self, shifts: Small, active: NDArray[np.bool_]) -> tuple[Small, Small]:
+        """Advance v ← v + x, set r = b − (A + s M) v in double precision and z to a cycle's answer to r.
+
+        Parameters are those of `measure`. `search` with None and `improve` follow.
+
+        Returns
+        -------
+        tuple
+            r·z and r·r, ``(n_systems, LANES)`` each; zero for systems that are not active.
+        """
+        ...
+
+    def solution(self) -> list[NDArray[np.float64]]:
+        """Return v of each system, ``(n_nodes, LANES)`` in node order, on the host."""
+        ...
+
+
 class Backend(Protocol):
     """Where a sweep runs."""
 
-    def open(self, systems: Sequence[System], dtype: type[np.floating[Any]]) -> Engine:
+    def open(self, systems: Sequence[System], dtype: type[np.floating[Any]]) -> SourceEngine:
         """Make an engine for systems of one dimension.
 
         Raises
