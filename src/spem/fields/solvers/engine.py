@@ -77,6 +77,13 @@ class Engine(Protocol):
         """
         ...
 
+    def select(self, active: NDArray[np.bool_]) -> None:
+        """Narrow the active systems, or widen them again to those of the last `measure` or `refine`.
+
+        Until the next call of any of the three; the vectors of other systems keep what they hold.
+        """
+        ...
+
     def search(self, beta: Small | None) -> Small:
         """Turn the search directions, p ← z + β p, set q = (A + s M) p, and return p·q.
 
@@ -125,7 +132,8 @@ class SourceEngine(Engine, Protocol):
     def load(self, rhs: Sequence[NDArray[np.float64]]) -> Small:
         """Take right-hand sides b, for each system ``(n_nodes, LANES)``; v = x = 0; return b·b.
 
-        The values of b are kept, and v held, in double precision; the blocks of a basis are not touched.
+        They are scaled by the square of `units`, as A is. The values of b are kept, and v held, in double
+        precision; the blocks of a basis are not touched.
         """
         ...
 

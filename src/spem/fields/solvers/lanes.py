@@ -13,7 +13,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, models, register_model
 
-LANES = 8
+from spem.fields.solvers.engine import LANES
+
 _SINGLE = ir.VectorType(ir.FloatType(), LANES)
 _DOUBLE = ir.VectorType(ir.DoubleType(), LANES)
 # Multiplications and additions may be fused; nothing else about the arithmetic is relaxed.

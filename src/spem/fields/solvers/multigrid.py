@@ -45,7 +45,7 @@ class Hierarchy:
 
     @classmethod
     def of(cls, system: System) -> Hierarchy:
-        """Coarsen a system until `COARSEST` nodes are left or no block merges any more."""
+        """Coarsen a system until `COARSEST` nodes are left; where no block merges, a coarser one will."""
         unit = min(system.shape.spacing)
         graph: tuple[Any, ...] = (
             system.domain.neighbours,
@@ -59,8 +59,6 @@ class Hierarchy:
         while graph[0].shape[0] > COARSEST:
             coarse_shape = (shape + 1) // 2
             blocks, aggregate = kernels.aggregate_voxels(voxels, shape, coarse_shape)
-            if blocks.size == voxels.size:
-                break
             levels.append(Level(graph, aggregate, cut_slabs(voxels, tuple(shape))))
             table, weight, diagonal, mass = kernels.coarsen(aggregate, blocks.size, graph)
             graph = (table, weight, 1, diagonal, mass)

@@ -1,183 +1,134 @@
-"""Galerkin reduced basis of the deficits u = 1 - v: all ρ from a few solves.
+"""Galerkin reduced bases of the deficits u = 1 - v of a batch of systems: all ρ from a few solves.
 
 Every u(s) solves (A + s M) u = s M·1, s = 1/ρ². In a basis B of solutions at a few s, the Galerkin solution,
 of the same equation with BᵀAB for A and BᵀMB for M, is the best approximation of u(s) in the energy norm, at
 the price of a small dense solve. All columns vanish toward the boundary as the deficits do; a constant among
 them would bring in the 1/θ of edges that are cut short, and cancellation with it.
+
+The columns lie in the engine; here are the small matrices, with the system first. A column of zeros, of a
+block of dependent vectors or of a system that was done, stands in them as one apart from all others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
-from spem.fields.hyperfield import galerkin
-from spem.fields.operator import System
-from spem.fields.solvers import reduced_kernels as kernels
-from spem.fields.solvers.lanes import LANES
-from spem.fields.solvers.team import Slabs, Team
+from spem.fields.solvers.engine import LANES, Engine, Small
 
 # Directions of a new block below this fraction of its largest are rounding noise of single precision.
 _DEPENDENT = 1e-13
 
-Small = NDArray[np.float64]
-
 
 class Reduced(NamedTuple):
-    """What is left of a basis: see `spem.fields.hyperfield.Hyperfield`."""
+    """What is left of a basis: columns B·turn, and the rest as `spem.fields.hyperfield.Hyperfield` has it.
 
-    columns: NDArray[Any]
+    A is in units of 1/`Engine.units`².
+    """
+
+    turn: Small
     gram: Small
     mass: Small
     stiffness: Small
     source: Small
 
 
-class ReducedBasis:
-    """Blocks of nearly orthonormal columns, and the operator restricted to them.
+class ReducedBases:
+    """Blocks of nearly orthonormal columns of each system, and its operator restricted to them.
 
     Parameters
     ----------
-    system
-        The system that the fields solve.
-    unit
-        Length that lengths are measured in, for scaling.
-    dtype
-        Precision that the columns are stored in.
-    slabs
-        First node of each slab, and the number of nodes.
-    team
-        Threads.
+    engine
+        The engine that holds the columns.
     """
 
-    def __init__(
-        self, system: System, unit: float, dtype: type[np.floating[Any]], slabs: Slabs, team: Team
-    ) -> None:
-        self.slabs, self.team = slabs, team
-        self.n_nodes = system.n_nodes
-        self.dtype = dtype
-        self.blocks: list[NDArray[Any]] = []
-        self.neighbours = system.domain.neighbours
-        self.weights = np.repeat(system.weights * unit**2, 2)
-        self.diagonal = system.diagonal * unit**2
-        self.weight = system.mass
-        self.gram = self.mass = self.stiffness = np.zeros((0, 0))
-        self.source = self.sums = np.zeros(0)
-
-    def solve(self, shifts: Small) -> Small:
-        """Coefficients ``(LANES * n_blocks, n_shifts)`` of the deficits of `shifts`."""
-        y = np.zeros((self.source.size, shifts.size))
-        used = self._used
-        block = np.ix_(used, used)
-        y[used] = galerkin(self.stiffness[block], self.mass[block], self.source[used], shifts)
-        return y
-
-    def lowest(self) -> float:
-        """Lowest eigenvalue of the operator on the basis, an upper bound of its lowest of all."""
-        block = np.ix_(self._used, self._used)
-        return float(scipy.linalg.eigh(self.stiffness[block], self.mass[block], eigvals_only=True)[0])
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+        count = len(engine.counts)
+        self.gram = self.mass = self.stiffness = np.zeros((count, 0, 0))
+        self.source = self.sums = np.zeros((count, 0))
 
     @property
-    def _used(self) -> NDArray[np.int64]:
-        """Columns that are not zero: a block of dependent vectors has fewer than `LANES`."""
-        return np.flatnonzero(np.diag(self.gram) > 0)
+    def used(self) -> NDArray[np.bool_]:
+        """``(n_systems, K)`` columns that are not zero."""
+        return np.diagonal(self.gram, axis1=1, axis2=2) > 0
 
-    def combine(self, y: Small, out: NDArray[Any]) -> None:
-        """Write the `LANES` vectors with coefficients `y` to the first n rows of `out`."""
-        if not self.blocks:
-            out[: self.n_nodes] = 0
-        for k, block in enumerate(self.blocks):
-            mix = np.ascontiguousarray(y[k * LANES : (k + 1) * LANES])
-            self.team.all(kernels.combine, self.slabs, block, mix, out, k > 0)
+    def solve(self, shifts: Small) -> Small:
+        """Coefficients ``(n_systems, K, n_shifts)`` of the deficits of shifts ``(n_systems, n_shifts)``."""
+        return _galerkin(self.stiffness, self._filled(self.mass), self.source, shifts)
 
-    def residual(self, u: NDArray[np.float64], r: NDArray[np.float32], shifts: Small) -> None:
-        """Write s M (1 - u) - A u to r, computed in double precision."""
-        graph = self.neighbours, self.weights, self.diagonal, self.weight
-        self.team.all(kernels.true_residual, self.slabs, u, r, *graph, shifts[None])
+    def lowest(self) -> Small:
+        """``(n_systems,)`` lowest eigenvalue of the operator on each basis, an upper bound of that of A."""
+        half = np.linalg.inv(np.linalg.cholesky(self._filled(self.mass)))
+        turned = half @ self.stiffness @ half.transpose(0, 2, 1)
+        # what stands for a column of zeros is above all others
+        top = 2 * np.abs(turned).sum(axis=(1, 2))[:, None] + 1.0
+        turned[:, *np.diag_indices(turned.shape[1])] += np.where(self.used, 0.0, top)
+        return np.asarray(np.linalg.eigvalsh(turned)[:, 0])
 
-    def extend(self, vectors: NDArray[np.float32]) -> None:
-        """Orthonormalise a block of `LANES` vectors against the basis and append it."""
-        gram = self._cross(vectors, vectors)[:LANES]
-        inside = np.zeros((self.source.size, LANES))
-        for k, old in enumerate(self.blocks):
-            inside[k * LANES : (k + 1) * LANES] = self._cross(old, vectors)[:LANES]
-        scale = np.sqrt(np.diag(gram))
-        scale = np.divide(1.0, scale, out=np.zeros(LANES), where=scale > 0)
-        used, project = self._used, np.zeros_like(inside)
-        project[used] = np.linalg.solve(self.gram[np.ix_(used, used)], inside[used])
-        size, direction = np.linalg.eigh((gram - inside.T @ project) * np.outer(scale, scale))
-        keep = size > _DEPENDENT
-        mix = np.zeros((LANES, LANES))
-        mix[:, keep] = scale[:, None] * direction[:, keep] / np.sqrt(size[keep])
-        remove = -project @ mix
-        block = np.zeros((self.n_nodes + 1, LANES), self.dtype)
-        self.team.all(kernels.combine, self.slabs, vectors, mix, block, False)
-        for k, old in enumerate(self.blocks):
-            part = np.ascontiguousarray(remove[k * LANES : (k + 1) * LANES])
-            self.team.all(kernels.combine, self.slabs, old, part, block, True)
-        self._append(block)
+    def extend(self, active: NDArray[np.bool_]) -> None:
+        """Orthonormalise the solutions that the engine has in x against the bases, and append them."""
+        overlaps = self.engine.overlaps()
+        inside, gram = overlaps[:, :-LANES], overlaps[:, -LANES:]
+        scale = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
+        scale = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
+        project = np.linalg.solve(self._filled(self.gram), inside)
+        left = gram - inside.transpose(0, 2, 1) @ project
+        size, direction = np.linalg.eigh(left * scale[:, :, None] * scale[:, None, :])
+        keep = (size > _DEPENDENT) & active[:, None]
+        length = np.sqrt(np.where(keep, size, np.inf))
+        mix = scale[:, :, None] * direction / length[:, None, :]
+        products = self.engine.append(mix, -project @ mix)
+        self.gram, self.stiffness, self.mass = (
+            _bordered(matrix, new)
+            for matrix, new in zip((self.gram, self.stiffness, self.mass), products[:3], strict=True)
+        )
+        self.sums = np.concatenate([self.sums, products.sums], axis=1)
+        self.source = np.concatenate([self.source, products.source], axis=1)
 
-    def compress(self, shifts: Small, tolerance: float) -> Reduced:
-        """Rotate to the fewest orthonormal columns that carry the deficits of `shifts`.
+    def compress(self, index: int, shifts: Small, tolerance: float) -> Reduced:
+        """Rotate one basis to the fewest orthonormal columns that carry the deficits of `shifts`.
 
         What is dropped changes no deficit by more than `tolerance` in the root mean square.
         """
-        used = self._used
-        upper = np.linalg.cholesky(self.gram[np.ix_(used, used)]).T
-        left, size, _ = np.linalg.svd(upper @ self.solve(shifts)[used], full_matrices=False)
-        rank = int(np.sum(size > tolerance * np.sqrt(self.n_nodes)))
-        turn = np.zeros((self.source.size, rank))
-        turn[used] = np.linalg.solve(upper, left[:, :rank])
-        columns = np.empty((self.n_nodes, rank), self.dtype)
-        out = np.zeros((self.n_nodes + 1, LANES), self.dtype)
-        for start in range(0, rank, LANES):
-            width = min(LANES, rank - start)
-            y = np.zeros((turn.shape[0], LANES))
-            y[:, :width] = turn[:, start : start + width]
-            self.combine(y, out)
-            columns[:, start : start + width] = out[:-1, :width]
-        gram = np.eye(rank + 1) * self.n_nodes
-        gram[1:, 1:] = turn.T @ self.gram @ turn
-        gram[0, 1:] = gram[1:, 0] = turn.T @ self.sums
-        return Reduced(
-            columns, gram, turn.T @ self.mass @ turn, turn.T @ self.stiffness @ turn, turn.T @ self.source
-        )
+        used, count = self.used[index], int(self.engine.counts[index])
+        block = np.ix_(used, used)
+        gram, mass, stiffness = (matrix[index][block] for matrix in (self.gram, self.mass, self.stiffness))
+        sums, source = self.sums[index, used], self.source[index, used]
+        upper = np.linalg.cholesky(gram).T
+        left, size, _ = np.linalg.svd(upper @ _galerkin(stiffness, mass, source, shifts), full_matrices=False)
+        rank = int(np.sum(size > tolerance * np.sqrt(count)))
+        turn = np.linalg.solve(upper, left[:, :rank])
+        whole = np.eye(rank + 1) * count
+        whole[1:, 1:] = turn.T @ gram @ turn
+        whole[0, 1:] = whole[1:, 0] = turn.T @ sums
+        spread = np.zeros((used.size, rank))
+        spread[used] = turn
+        return Reduced(spread, whole, turn.T @ mass @ turn, turn.T @ stiffness @ turn, turn.T @ source)
 
-    def _append(self, block: NDArray[Any]) -> None:
-        self.blocks.append(block)
-        gram = [self._cross(old, block) for old in self.blocks]
-        stiffness, mass = zip(*(self._cross_operator(old, block) for old in self.blocks), strict=True)
-        self.gram, self.stiffness, self.mass = (
-            _border(matrix, products)
-            for matrix, products in ((self.gram, gram), (self.stiffness, stiffness), (self.mass, mass))
-        )
-        self.sums = np.append(self.sums, gram[0][LANES])
-        self.source = np.append(self.source, mass[0][LANES])
-
-    def _cross(self, block: NDArray[Any], other: NDArray[Any]) -> Small:
-        partial = np.empty((self.slabs.size - 1, LANES + 1, LANES))
-        self.team.all(kernels.cross, self.slabs, block, other, partial)
-        return np.asarray(partial.sum(axis=0))
-
-    def _cross_operator(self, block: NDArray[Any], other: NDArray[Any]) -> Small:
-        partial = np.empty((self.slabs.size - 1, 2, LANES + 1, LANES))
-        graph = self.neighbours, self.weights, self.diagonal, self.weight
-        self.team.all(kernels.cross_operator, self.slabs, block, other, partial, *graph)
-        return np.asarray(partial.sum(axis=0))
+    def _filled(self, matrix: Small) -> Small:
+        """Put ones on the diagonal for columns of zeros."""
+        filled = matrix.copy()
+        filled[:, *np.diag_indices(matrix.shape[1])] += ~self.used
+        return filled
 
 
-def _border(matrix: Small, products: Sequence[Small]) -> Small:
-    """Append the rows and columns of a new block to a symmetric reduced matrix."""
-    columns = np.concatenate([product[:LANES] for product in products])
-    old = matrix.shape[0]
-    grown = np.zeros((old + LANES, old + LANES))
-    grown[:old, :old] = matrix
-    grown[:, old:] = columns
-    grown[old:, :old] = columns[:old].T
-    corner = grown[old:, old:]
-    grown[old:, old:] = (corner + corner.T) / 2
+def _galerkin(stiffness: Small, mass: Small, source: Small, shifts: Small) -> Small:
+    """Solve (A + s M) y = s M·1 for each s of each system: the coefficients of 1 - v, one column each."""
+    s = shifts[..., :, None, None]
+    matrix = stiffness[..., None, :, :] + s * mass[..., None, :, :]
+    return np.asarray(np.linalg.solve(matrix, s * source[..., None, :, None])[..., 0].swapaxes(-1, -2))
+
+
+def _bordered(matrix: Small, products: Small) -> Small:
+    """Append the rows and columns of a new block to symmetric reduced matrices."""
+    old = matrix.shape[1]
+    grown = np.zeros((matrix.shape[0], old + LANES, old + LANES))
+    grown[:, :old, :old] = matrix
+    grown[:, :, old:] = products
+    grown[:, old:, :old] = products[:, :old].transpose(0, 2, 1)
+    corner = grown[:, old:, old:]
+    grown[:, old:, old:] = (corner + corner.transpose(0, 2, 1)) / 2
     return grown

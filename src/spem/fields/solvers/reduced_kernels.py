@@ -96,3 +96,27 @@ def true_residual(
             for k in range(neighbours.shape[1]):
                 value = add(value, mul(splat(weights[k]), load_wide(u, neighbours[i, k])))
             store(r, i, value)
+
+
+@njit(cache=True, nogil=True)
+def source_residual(
+    rhs: Small,
+    v: Small,
+    r: Block,
+    neighbours: NDArray[np.int32],
+    weights: Small,
+    diagonal: Small,
+    mass: Small,
+    shift: Small,
+    slabs: Slabs,
+    first: int,
+    stride: int,
+) -> None:
+    """Write r = b - (A + shift M) v."""
+    s = load(shift, 0)
+    for slab in range(first, slabs.size - 1, stride):
+        for i in range(slabs[slab], slabs[slab + 1]):
+            value = sub(load(rhs, i), mul(add(splat(diagonal[i]), mul(s, splat(mass[i]))), load(v, i)))
+            for k in range(neighbours.shape[1]):
+                value = add(value, mul(splat(weights[k]), load(v, neighbours[i, k])))
+            store(r, i, value)

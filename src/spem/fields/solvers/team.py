@@ -50,8 +50,13 @@ class Team:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the threads."""
         if self._pool is not None:
             self._pool.shutdown()
+            self._pool = None
 
     def all(self, kernel: Callable[..., None], slabs: Slabs, *arguments: Any) -> None:
         """Do all slabs, in any order."""
