@@ -18,7 +18,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from spem.fields.solvers.lanes import LANES, add, div, load, mul, splat, store, sub, widen
+from spem.fields.solvers.engine import LANES
+from spem.fields.solvers.lanes import add, div, load, mul, splat, store, sub, widen
 
 Lanes = NDArray[np.float32]
 Table = NDArray[np.int32]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from spem.fields.operator import System
 from spem.fields.solvers import kernels
-from spem.fields.solvers.lanes import LANES
+from spem.fields.solvers.engine import LANES
 from spem.fields.solvers.team import Team, cut_slabs
 
 # The coarsest level is inverted densely, lane by lane.

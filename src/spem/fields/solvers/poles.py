@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.fields.solvers.lanes import LANES
+from spem.fields.solvers.engine import LANES
 
 # Poles of the first block, as fractions of the logarithmic range of the shifts: Chebyshev nodes stretched
 # to the largest shift, where the fields vary fastest. Least worst error over hands, combs and balls.

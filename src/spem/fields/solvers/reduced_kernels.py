@@ -11,7 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from spem.fields.solvers.lanes import LANES, add, load, load_wide, mul, splat, store, sub
+from spem.fields.solvers.engine import LANES
+from spem.fields.solvers.lanes import add, load, load_wide, mul, splat, store, sub
 
 Block = NDArray[Any]
 Small = NDArray[np.float64]

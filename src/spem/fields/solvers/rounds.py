@@ -102,7 +102,7 @@ class Rounds:
             if block < self.max_blocks and active.any():
                 self._solve(active, product, errors)
                 self.bases.extend(active)
-                for b in np.flatnonzero(active):
+                for b in np.flatnonzero(active).tolist():
                     self.poles[b] = np.append(self.poles[b], shifts[b])
         return Outcome(self.bases, self.error, self.iterations, ~active)
 
@@ -110,7 +110,7 @@ class Rounds:
         """Next eight shifts of each active system; ones for the others."""
         shifts = np.ones((len(self.targets), LANES))
         lowest = self.bases.lowest() if self.bases.source.size else np.zeros(active.size)
-        for b in np.flatnonzero(active):
+        for b in np.flatnonzero(active).tolist():
             target, poles = self.targets[b], self.poles[b]
             shifts[b] = target.next(poles, lowest[b], self.highest[b]) if poles.size else target.first()
         return shifts
@@ -136,7 +136,7 @@ class Rounds:
                 self.engine.select(going)
                 selected = going
         self.engine.select(active)
-        for b in np.flatnonzero(active):
+        for b in np.flatnonzero(active).tolist():
             lowest = _lowest_ritz(
                 np.array([each[b] for each in steps]), np.array([each[b] for each in turns])
             )
