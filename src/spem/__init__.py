@@ -6,7 +6,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from spem.api.fields import field, maps, sweep
+    from spem.api.fields import field, maps, sweep, sweep_many
     from spem.api.parts import parts, source_fields, sources
     from spem.codes.codes import Codes, Failure
     from spem.codes.joining import fusion_weights, join_codes
@@ -214,6 +214,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "sources",
     "surroundings",
     "sweep",
+    "sweep_many",
     "synthetic",
     "transform_walk",
     "turning_angles",
@@ -342,6 +343,7 @@ _HOME = {
     "sources": "spem.api.parts",
     "surroundings": "spem.embedding.correspondence",
     "sweep": "spem.api.fields",
+    "sweep_many": "spem.api.fields",
     "synthetic": "spem.shapes.synthetic",
     "transform_walk": "spem.fields.walks.conditioned",
     "turning_angles": "spem.fields.level_curves",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from spem.errors import ParameterError
 from spem.fields.hyperfield import Hyperfield
 from spem.fields.operator import Boundary, assemble
 from spem.fields.rho import DEFAULT_COUNT, Scheme, check_rho, sample_rho
+from spem.fields.solvers.engine import Backend
 from spem.fields.solvers.protocol import Solver
 from spem.fields.solvers.sweep import Sweep
 from spem.shapes.shape import Shape
@@ -26,6 +28,7 @@ def field(
     *,
     boundary: Boundary = "surface",
     solver: Solver | None = None,
+    device: Backend | None = None,
 ) -> NDArray[np.floating[Any]]:
     """Solve Δv − v/ρ² = 0 with v = 1 on the boundary (1.1).
 
@@ -39,6 +42,8 @@ def field(
         ``"surface"`` (second order) or ``"voxel"`` (the paper's).
     solver
         Any solver of `spem.fields.solvers`; the fast sweep to 1e-10 by default.
+    device
+        Where the fast sweep runs, such as ``spem.Cuda()``; the processor when None.
 
     Returns
     -------
@@ -47,9 +52,11 @@ def field(
     Raises
     ------
     ParameterError
-        If a ρ is not positive.
+        If a ρ is not positive, or a solver and a device are given together.
     ConvergenceError
         If the solver misses its tolerance; it carries the best iterate.
+    SizeError
+        If the shape does not fit into the memory of the device.
 
     Examples
     --------
@@ -58,8 +65,11 @@ def field(
     >>> print(round(float(v.min()), 3))  # 1 / cosh(4.5 / 2)
     0.209
     """
+    if solver is not None and device is not None:
+        msg = f"solver={solver!r} and device={device!r} exclude each other; give the device to the solver"
+        raise ParameterError(msg)
     values = check_rho(rho)
-    chosen = Sweep(rtol=_FIELD_RTOL) if solver is None else solver
+    chosen = Sweep(rtol=_FIELD_RTOL, device=device) if solver is None else solver
     solution = chosen.solve(assemble(shape, boundary), values).checked(shape.name)
     return solution.values[:, 0] if np.ndim(rho) == 0 else solution.values
 
@@ -72,6 +82,7 @@ def sweep(
     scheme: Scheme = "linear",
     boundary: Boundary = "surface",
     rtol: float = 1e-6,
+    device: Backend | None = None,
 ) -> Hyperfield:
     """Solve for all ρ of a range at once, as a low-rank hyperfield.
 
@@ -88,6 +99,15 @@ def sweep(
         ``"surface"`` (second order) or ``"voxel"`` (the paper's).
     rtol
         Largest error of any field at any node, relative to the field's maximum.
+    device
+        Where to compute, such as ``spem.Cuda()``; the processor when None.
+
+    Raises
+    ------
+    ConvergenceError
+        If `rtol` is missed.
+    SizeError
+        If the shape does not fit into the memory of the device.
 
     Examples
     --------
@@ -97,7 +117,64 @@ def sweep(
     """
     system = assemble(shape, boundary)
     samples = sample_rho(shape.size, count=n_rho, scheme=scheme) if rho is None else check_rho(rho)
-    return Sweep(rtol=rtol).hyperfield(system, samples)
+    return Sweep(rtol=rtol, device=device).hyperfield(system, samples)
+
+
+def sweep_many(
+    shapes: Sequence[Shape],
+    rho: ArrayLike | None = None,
+    *,
+    n_rho: int = DEFAULT_COUNT,
+    scheme: Scheme = "linear",
+    boundary: Boundary = "surface",
+    rtol: float = 1e-6,
+    device: Backend | None = None,
+) -> list[Hyperfield]:
+    """Sweep many shapes, on a device all of one dimension together; each comes out as `sweep` has it alone.
+
+    Parameters
+    ----------
+    shapes
+        Shapes, of several dimensions too. Their systems and hyperfields are held in memory all at once.
+    rho, n_rho, scheme, boundary, rtol
+        As for `sweep`; a given `rho` is that of every shape.
+    device
+        Where to compute, such as ``spem.Cuda()``; the processor when None. What does not fit into its memory
+        together is swept in halves.
+
+    Returns
+    -------
+    list
+        A hyperfield for each shape, in their order.
+
+    Raises
+    ------
+    ConvergenceError
+        If a shape misses `rtol`.
+    SizeError
+        If a single shape does not fit into the memory of the device.
+
+    Examples
+    --------
+    >>> import spem
+    >>> disks = [spem.synthetic.disk(radius=r, spacing=1.0) for r in (8.0, 9.0)]
+    >>> [field.shape.n_nodes for field in spem.sweep_many(disks, rho=[2, 4])]
+    [193, 249]
+    """
+    if isinstance(shapes, Shape):
+        msg = f"shapes={shapes!r}: expected a list of shapes; use spem.sweep for one"
+        raise ParameterError(msg)
+    systems = [assemble(shape, boundary) for shape in shapes]
+    given = None if rho is None else check_rho(rho)
+    solver, found = Sweep(rtol=rtol, device=device), dict[int, Hyperfield]()
+    for ndim in sorted({shape.ndim for shape in shapes}):
+        rows = [row for row, shape in enumerate(shapes) if shape.ndim == ndim]
+        samples = [
+            sample_rho(shapes[row].size, count=n_rho, scheme=scheme) if given is None else given
+            for row in rows
+        ]
+        found |= zip(rows, solver.hyperfields([systems[row] for row in rows], samples), strict=True)
+    return [found[row] for row in range(len(systems))]
 
 
 def maps(
@@ -110,6 +187,7 @@ def maps(
     scheme: Scheme = "linear",
     boundary: Boundary = "surface",
     rtol: float = 1e-6,
+    device: Backend | None = None,
 ) -> Maps:
     """SPEM maps of a shape or of its hyperfield: P = YΦ (4.4).
 
@@ -121,8 +199,13 @@ def maps(
         Number of maps.
     centred
         Remove the mean field first.
-    rho, n_rho, scheme, boundary, rtol
+    rho, n_rho, scheme, boundary, rtol, device
         As for `sweep`; a hyperfield has its own.
+
+    Raises
+    ------
+    ParameterError
+        If settings of the sweep are given for a hyperfield.
 
     Examples
     --------
@@ -130,10 +213,13 @@ def maps(
     >>> spem.maps(spem.synthetic.disk(radius=20.0, spacing=1.0), n_maps=4).basis.shape
     (64, 4)
     """
-    given = (rho is None, n_rho, scheme, boundary, rtol)
+    given = (rho is None, n_rho, scheme, boundary, rtol, device is None)
     if not isinstance(source, Hyperfield):
-        source = sweep(source, rho, n_rho=n_rho, scheme=scheme, boundary=boundary, rtol=rtol)
-    elif given != (True, DEFAULT_COUNT, "linear", "surface", 1e-6):
-        msg = "maps of a hyperfield: rho, n_rho, scheme, boundary and rtol are its own; give them to sweep"
+        source = sweep(source, rho, n_rho=n_rho, scheme=scheme, boundary=boundary, rtol=rtol, device=device)
+    elif given != (True, DEFAULT_COUNT, "linear", "surface", 1e-6, True):
+        msg = (
+            "maps of a hyperfield: rho, n_rho, scheme, boundary, rtol and device are its own; "
+            "give them to sweep"
+        )
         raise ParameterError(msg)
     return compute_maps(source, n_maps, centred=centred)
