@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spem.codes.bands import Bands
 from spem.codes.settings import Settings
@@ -19,7 +20,7 @@ from spem.fields.solvers.sweep import Sweep
 from spem.shapes.shape import Shape
 
 # Single precision stores the features, and codes change by less than with another seed.
-_SWEEP_RTOL = 1e-6
+SWEEP_RTOL = 1e-6
 
 
 def sweep_bands(shape: Shape, settings: Settings, threads: int | None = None) -> Hyperfield:
@@ -40,11 +41,38 @@ def sweep_bands(shape: Shape, settings: Settings, threads: int | None = None) ->
     >>> sweep_bands(disk(radius=10.0, spacing=1.0), Settings(features="spem")).rho.size
     64
     """
+    system = assemble(shape, settings.boundary)
+    return Sweep(rtol=SWEEP_RTOL, threads=threads).hyperfield(system, swept_rho(shape, settings))
+
+
+def swept_rho(shape: Shape, settings: Settings) -> NDArray[np.float64]:
+    """Sample ρ over all bands of a shape at once, in the unit of its spacing.
+
+    Examples
+    --------
+    >>> from spem.shapes.synthetic import disk
+    >>> ranges = [(0.02, 0.1), (0.1, 0.4)]
+    >>> rho = swept_rho(disk(radius=10.0, spacing=1.0), Settings(features="spem", rho_ranges=ranges))
+    >>> round(float(rho[-1] / rho[0]), 6)
+    20.0
+    """
     low, high = (
         pick(bound) for pick, bound in zip((min, max), zip(*settings.rho_ranges, strict=True), strict=True)
     )
-    rho = sample_rho(shape.size, low * shape.size, high * shape.size, max(settings.n_rho, 2), "log")
-    return Sweep(rtol=_SWEEP_RTOL, threads=threads).hyperfield(assemble(shape, settings.boundary), rho)
+    return sample_rho(shape.size, low * shape.size, high * shape.size, max(settings.n_rho, 2), "log")
+
+
+def band_rho(shape: Shape, settings: Settings, band: int = 0) -> NDArray[np.float64]:
+    """Sample ρ of one band of a shape, in the unit of its spacing; see `band_maps`.
+
+    Examples
+    --------
+    >>> from spem.shapes.synthetic import disk
+    >>> band_rho(disk(radius=10.0, spacing=1.0), Settings(features="spem")).size
+    64
+    """
+    size, (low, high) = shape.size, settings.rho_ranges[band]
+    return sample_rho(size, low * size, high * size, settings.n_rho, settings.scheme)
 
 
 def node_features(field: Hyperfield, settings: Settings) -> Bands:
@@ -100,8 +128,7 @@ def band_maps(field: Hyperfield, settings: Settings, band: int = 0) -> Maps:
     >>> band_maps(sweep_bands(disk(radius=10.0, spacing=1.0), settings), settings).rho.size
     64
     """
-    size, (low, high) = field.shape.size, settings.rho_ranges[band]
-    rho = sample_rho(size, low * size, high * size, settings.n_rho, settings.scheme)
+    rho = band_rho(field.shape, settings, band)
     return compute_maps(replace(field, rho=rho), settings.n_maps, centred=settings.centred)
 
 

@@ -153,7 +153,10 @@ class Model:
         ParameterError
             When the maps are not finite or not of the model's bands.
         """
-        codes = self.codes(maps, name)
+        return self.join(self.codes(maps, name))
+
+    def join(self, codes: Sequence[NDArray[np.float64]]) -> NDArray[np.float32]:
+        """Make the code ``(n_code,)`` of a shape of those of its parts, as `codes` makes them."""
         code = codes[0] if len(codes) == 1 else join_codes(codes, self.weights)
         return code.astype(np.float32)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from spem.codes.bands import Bands, as_bands
 from spem.codes.normalise import Normalisation
 from spem.codes.settings import Settings
-from spem.codes.vlad import VLAD, encode
+from spem.codes.vlad import VLAD, aggregate, concatenate, encode
+from spem.codes.vocabulary import Residuals
 from spem.errors import ModelError, ParameterError
 
 # Words of each kind where no number is asked for, and the training nodes that each has to stand for: sixteen
@@ -99,6 +100,12 @@ class Part:
             raise ParameterError(msg)
         learnt = self.normalisations, self.centers, self.settings.power
         return encode(checked, *learnt, self.spreads or None, self.cuts or None)
+
+    def encode_residuals(self, found: Sequence[Residuals]) -> NDArray[np.float64]:
+        """Make the code ``(n_code,)`` from what was summed over the nodes of a shape, band by band."""
+        spreads = self.spreads or (None,) * len(self.centers)
+        bands = zip(found, spreads, strict=True)
+        return concatenate([aggregate(each, self.settings.power, spread) for each, spread in bands])
 
     def to_arrays(self, prefix: str, first: int) -> dict[str, NDArray[Any]]:
         """Return the learnt arrays by name, bands being numbered from `first`."""

@@ -14,7 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from spem.codes.bands import Bands, iterate_bands
 from spem.codes.normalise import Normalisation, Scaling, peak_share, unit_rms
-from spem.codes.vocabulary import Vocabulary, sum_residuals
+from spem.codes.vocabulary import Residuals, Vocabulary, sum_residuals
 from spem.errors import ParameterError
 
 _FEWEST_CENTERS = 8
@@ -70,7 +70,31 @@ def vlad(
     >>> vlad(np.array([[0.0, 0.0], [0.3, 0.4]]), np.array([[0.0, 0.0], [5.0, 5.0]]), power=1.0)
     array([0.6, 0.8, 0. , 0. ])
     """
-    found = sum_residuals(features, centers, levels, n_levels)
+    return aggregate(sum_residuals(features, centers, levels, n_levels), power, spreads)
+
+
+def aggregate(
+    found: Residuals, power: float = 0.25, spreads: NDArray[np.floating] | None = None
+) -> NDArray[np.float64]:
+    """Make the vector of one band from the sums over the nodes of each word: (5.3).
+
+    Parameters
+    ----------
+    found
+        What the nodes differ from their centres by.
+    power, spreads
+        As `vlad` takes them.
+
+    Returns
+    -------
+    NDArray
+        ``(n_rows * n_features,)`` code, row by row; twice that with `spreads`.
+
+    Examples
+    --------
+    >>> aggregate(sum_residuals(np.array([[3.0, 4.0]]), np.zeros((1, 2))), power=1.0)
+    array([0.6, 0.8])
+    """
     moments = [found.sums] if spreads is None else [found.sums, found.excess(spreads)]
     rows = np.hstack([moment / _length(moment, axis=1) for moment in moments])
     code = np.sign(rows) * np.abs(rows) ** power
@@ -125,6 +149,17 @@ def encode(
     ):
         levels = np.searchsorted(inner, peak_share(maps)) if len(inner) else None
         codes.append(vlad(normal.apply(maps), words, power, spread, levels, len(inner) + 1))
+    return concatenate(codes)
+
+
+def concatenate(codes: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Put the vectors of the bands one after the other, and bring the whole to unit L2 norm.
+
+    Examples
+    --------
+    >>> concatenate([np.array([3.0]), np.array([4.0])])
+    array([0.6, 0.8])
+    """
     code = np.concatenate(codes)
     return np.asarray(code / _length(code))
 

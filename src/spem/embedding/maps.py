@@ -103,21 +103,87 @@ def compute_maps(field: Hyperfield, n_maps: int = 6, *, centred: bool = False) -
     >>> bool((result.basis[-1] > 0).all())
     True
     """
-    if not 1 <= n_maps <= field.rho.size:
-        msg = f"n_maps={n_maps}: expected 1 to {field.rho.size}, the number of sampled rho"
+    found = principal_components(
+        field.gram, field.coefficients(), field.rho, field.shape.n_nodes, n_maps, centred=centred
+    )
+    mix = found.mix.astype(field.basis.dtype)
+    values = field.basis @ mix[1:] + mix[0]
+    return Maps(field.shape, values, found.basis, found.variance, field.rho, found.total_variance, centred)
+
+
+@dataclass(frozen=True, eq=False)
+class Components:
+    """Principal components of a hyperfield over ρ, before they are projected to the nodes.
+
+    Parameters
+    ----------
+    mix
+        ``(rank + 1, n_maps)`` coefficients of the maps in the constant and the columns of the hyperfield.
+    basis
+        ``(n_rho, n_maps)`` orthonormal columns Φ.
+    variance
+        ``(n_maps,)`` mean square of each map over the nodes.
+    total_variance
+        Sum of the variances of all components.
+    """
+
+    mix: NDArray[np.float64]
+    basis: NDArray[np.float64]
+    variance: NDArray[np.float64]
+    total_variance: float
+
+
+def principal_components(
+    gram: NDArray[np.float64],
+    coefficients: NDArray[np.float64],
+    rho: NDArray[np.float64],
+    n_nodes: int,
+    n_maps: int,
+    *,
+    centred: bool = False,
+) -> Components:
+    """Find the leading eigenvectors of YᵀY (4.4) from the small matrices of a hyperfield alone.
+
+    Parameters
+    ----------
+    gram
+        ``(rank + 1, rank + 1)`` inner products of the constant and the columns, as `Hyperfield.gram`.
+    coefficients
+        ``(rank + 1, n_rho)`` coefficients of the fields, as `Hyperfield.coefficients` returns them.
+    rho
+        ``(n_rho,)`` the sampled ρ.
+    n_nodes
+        Number of nodes.
+    n_maps, centred
+        As `compute_maps` takes them.
+
+    Raises
+    ------
+    ParameterError
+        When there are fewer samples of ρ than maps, or no map is asked for.
+
+    Examples
+    --------
+    Two fields on one node, 3 and 4 times the constant, have one component:
+
+    >>> found = principal_components(np.eye(1), np.array([[3.0, 4.0]]), np.array([1.0, 2.0]), 1, 1)
+    >>> found.basis.ravel(), found.variance
+    (array([0.6, 0.8]), array([25.]))
+    """
+    if not 1 <= n_maps <= rho.size:
+        msg = f"n_maps={n_maps}: expected 1 to {rho.size}, the number of sampled rho"
         raise ParameterError(msg)
-    upper = _root(field.gram)
-    small = upper @ field.coefficients()
+    upper = _root(gram)
+    small = upper @ coefficients
     if centred:
         small[0] = 0.0  # the part along the constant
     left, size, right = np.linalg.svd(small, full_matrices=False)
     size = np.pad(size, (0, max(0, n_maps - size.size)))
     left, basis = _complete(left, n_maps), _complete(right.T, n_maps)
-    sign = _signs(basis, int(np.argmax(field.rho)))
-    mix = np.linalg.lstsq(upper, left * (size[:n_maps] * sign))[0]
-    values = field.basis @ mix[1:].astype(field.basis.dtype) + mix[0].astype(field.basis.dtype)
-    variance, total = np.square(size) / field.shape.n_nodes, np.square(size).sum() / field.shape.n_nodes
-    return Maps(field.shape, values, basis * sign, variance[:n_maps], field.rho, float(total), centred)
+    sign = _signs(basis, int(np.argmax(rho)))
+    mix = np.asarray(np.linalg.lstsq(upper, left * (size[:n_maps] * sign))[0], np.float64)
+    variance, total = np.square(size) / n_nodes, np.square(size).sum() / n_nodes
+    return Components(mix, basis * sign, variance[:n_maps], float(total))
 
 
 def _root(gram: NDArray[np.float64]) -> NDArray[np.float64]:
