@@ -67,15 +67,21 @@ class Targets:
         """
         if self.few is not None:
             return self.few
-        candidates, chosen = self.dense(lowest, highest), list(poles)
+        candidates = self.dense(lowest, highest)
         spread = _spread(candidates, lowest, highest)
         again = poles.size > LANES
+        gap = _log_ratio(spread, _spread(poles, lowest, highest)).sum(axis=1)
+        chosen = []
         for _ in range(LANES - again):
-            taken = _spread(np.array(chosen), lowest, highest)
-            distance = np.abs(np.subtract.outer(spread, taken))
-            ratio = distance / np.add.outer(spread, taken) + np.finfo(float).tiny
-            chosen.append(candidates[int(np.argmax(np.log(ratio).sum(axis=1)))])
-        return np.array([*chosen[poles.size :], *candidates[-1:]] if again else chosen[poles.size :])
+            chosen.append(int(np.argmax(gap)))
+            gap = gap + _log_ratio(spread, spread[chosen[-1:]])[:, 0]
+        return np.append(candidates[chosen], candidates[-1:] if again else [])
+
+
+def _log_ratio(spread: Small, poles: Small) -> Small:
+    """Logarithm of |σ - σₚ|/(σ + σₚ), a row for each σ and a column for each pole."""
+    distance, total = np.abs(np.subtract.outer(spread, poles)), np.add.outer(spread, poles)
+    return np.asarray(np.log(distance / total + np.finfo(float).tiny))
 
 
 def _spread(shifts: Small, lowest: float, highest: float) -> Small:

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dsterf
 
 from spem.fields.solvers.engine import LANES, Engine, Small
 from spem.fields.solvers.poles import Targets
@@ -161,5 +161,6 @@ def _lowest_ritz(steps: Small, turns: Small) -> float:
             continue
         a, b = alpha[:count], beta[: count - 1]
         diagonal = 1 / a + np.append(0.0, b / a[:-1])
-        lowest = min(lowest, scipy.linalg.eigvalsh_tridiagonal(diagonal, np.sqrt(b) / a[:-1])[0])
+        values = dsterf(diagonal, np.sqrt(b) / a[:-1])[0] if count > 1 else diagonal  # ascending
+        lowest = min(lowest, values[0])
     return max(float(lowest), _LOWEST_TRUSTED)
