@@ -1,0 +1,196 @@
+// The levels of a batch of systems: rows by colour, blocks of 2^DIM voxels, and their graphs.
+//
+// Made once a batch, one thread a node, row or coarse row; nothing is added up by atomics, and threads that
+// write the same word write the same value, so levels do not depend on the order of threads. A position is
+// the flat C-order index of a voxel, or block, in the grid of its system; -1 marks padding rows.
+//
+// Bytes moved, per node of the finest level and for DIM = 3: colours 9, their cumulative sum 5, rows 33,
+// neighbours 76 and as many gathered, values 56; per level, for each of its own rows: marks 13, joins 25, and
+// for each coarse row 32 + 8 * 64 of the finer rows, and 116 written. About 0.4 kB a node in all, of which a
+// V-cycle moves some 0.3 kB.
+
+#include "common.cuh"
+
+#define FACES (2 * DIM)
+#define CORNERS (1 << DIM)
+
+// A block of 2^DIM voxels: its position, its cell in tables over the grid, which of its corners a voxel is.
+struct Block {
+    long long position;
+    long long cell;
+    int corner;
+};
+
+// Cells of a system are those of red blocks, then those of black ones, which take turns on the last axis.
+__device__ inline Block block_of(long long voxel, const int* side, const long long* first_cell) {
+    Block block = {0, 0, 0};
+    long long stride = 1, cell_stride = 1;
+    int colour = 0;
+    for (int axis = DIM - 1; axis >= 0; --axis) {
+        const int index = (int)(voxel % side[axis]);
+        voxel /= side[axis];
+        const int half = index / 2, width = (side[axis] + 1) / 2;
+        const int turns = axis == DIM - 1 ? 2 : 1;
+        block.position += half * stride;
+        block.cell += half / turns * cell_stride;
+        block.corner |= (index & 1) << (DIM - 1 - axis);
+        stride *= width;
+        cell_stride *= (width + turns - 1) / turns;
+        colour ^= half & 1;
+    }
+    block.cell += first_cell[colour];
+    return block;
+}
+
+// The system that a node of the concatenated systems belongs to.
+__device__ inline int system_of(long long node, const long long* first_node, int n_systems) {
+    int low = 0, high = n_systems;
+    while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        if (first_node[middle] <= node)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+// Whether nodes are black: reads voxels (8 bytes a node), writes black (1).
+extern "C" __global__ void colour_nodes(const long long* voxels, const long long* first_node, const int* grid,
+                                        int n_systems, long long n_nodes, signed char* black) {
+    const long long node = (long long)blockIdx.x * THREADS + threadIdx.x;
+    if (node >= n_nodes)
+        return;
+    const int* side = grid + DIM * system_of(node, first_node, n_systems);
+    long long voxel = voxels[node];
+    int colour = 0;
+    for (int axis = DIM - 1; axis >= 0; --axis) {
+        colour ^= (int)(voxel % side[axis]) & 1;
+        voxel /= side[axis];
+    }
+    black[node] = (signed char)colour;
+}
+
+// The row of each node, from the black nodes up to it, and its voxel at that row: reads voxels, black and
+// n_black (13 bytes a node), writes rows and position (12).
+extern "C" __global__ void number_nodes(const long long* voxels, const signed char* black, const int* n_black,
+                                        const long long* first_node, const long long* base, int n_systems,
+                                        long long n_nodes, int* rows, long long* position) {
+    const long long node = (long long)blockIdx.x * THREADS + threadIdx.x;
+    if (node >= n_nodes)
+        return;
+    const long long* start = base + 2 * system_of(node, first_node, n_systems);
+    const long long row = black[node] ? start[1] + n_black[node] : start[0] + node - n_black[node];
+    rows[node] = (int)row;
+    position[row] = voxels[node];
+}
+
+// Neighbour table by rows, one thread an entry: reads found and a row number (4 + 4 bytes an entry) and the
+// row of the node, writes neighbours (4).
+extern "C" __global__ void place_neighbours(const int* found, const int* rows, const long long* first_node,
+                                            int n_systems, long long n_nodes, int dummy, int* neighbours) {
+    const long long entry = (long long)blockIdx.x * THREADS + threadIdx.x;
+    if (entry >= n_nodes * FACES)
+        return;
+    const long long node = entry / FACES;
+    const int system = system_of(node, first_node, n_systems);
+    const long long other = first_node[system] + found[entry];
+    neighbours[(long long)rows[node] * FACES + entry % FACES] =
+        other < first_node[system + 1] ? rows[other] : dummy;
+}
+
+// Values of nodes by rows, in double and single precision: reads 12 bytes a node, writes 12.
+extern "C" __global__ void place_values(const double* values, const int* rows, long long n_nodes,
+                                        double* exact, float* rounded) {
+    const long long node = (long long)blockIdx.x * THREADS + threadIdx.x;
+    if (node >= n_nodes)
+        return;
+    exact[rows[node]] = values[node];
+    rounded[rows[node]] = (float)values[node];
+}
+
+// Mark the cells of blocks that hold a row: reads position (8 bytes a row), writes marks (1). A system
+// without cells is not coarsened any more.
+extern "C" __global__ void mark_blocks(const long long* position, const int* tile_system, const int* grid,
+                                       const long long* first_cell, long long n_rows, signed char* marks) {
+    const long long row = (long long)blockIdx.x * THREADS + threadIdx.x;
+    if (row >= n_rows || position[row] < 0)
+        return;
+    const int system = tile_system[row / TILE];
+    const long long* cells = first_cell + 2 * system;
+    if (cells[0] == cells[2])
+        return;
+    marks[block_of(position[row], grid + DIM * system, cells).cell] = 1;
+}
+
+// Join rows to their blocks: reads position and n_marked (12 bytes a row), writes parent, children and the
+// position of the parent (16); rows with no block get the dummy row as their parent.
+extern "C" __global__ void join_blocks(const long long* position, const int* tile_system, const int* grid,
+                                       const long long* first_cell, const int* n_marked, const long long* base,
+                                       long long n_rows, int dummy, int* parent, int* children,
+                                       long long* parent_position) {
+    const long long row = (long long)blockIdx.x * THREADS + threadIdx.x;
+    if (row >= n_rows)
+        return;
+    const int system = tile_system[row / TILE];
+    const long long* cells = first_cell + 2 * system;
+    parent[row] = dummy;
+    if (position[row] < 0 || cells[0] == cells[2])
+        return;
+    const Block block = block_of(position[row], grid + DIM * system, cells);
+    const int colour = block.cell >= cells[1];
+    const long long above = base[2 * system + colour] + n_marked[block.cell];
+    parent[row] = (int)above;
+    children[above * CORNERS + block.corner] = (int)row;
+    parent_position[above] = block.position;
+}
+
+// The Galerkin graph of unsmoothed aggregation with the Laplacian halved, for piecewise constants overestimate
+// the stiffness by two a level, the mass not at all. One thread a coarse row, over its children in C order:
+// reads 4 bytes a child and, of each, its graph and the parents of its neighbours (8 + 16 DIM, 4 less a weight
+// on the finest level), writes the coarse graph (8 + 16 DIM).
+extern "C" __global__ void coarsen(const int* children, const int* parent, const int* neighbours,
+                                   const float* weight, const float* diagonal, const float* mass,
+                                   const int* tile_system, int fine, int n_rows, int n_coarse, int* table,
+                                   float* coarse_weight, float* coarse_diagonal, float* coarse_mass) {
+    const long long here = (long long)blockIdx.x * THREADS + threadIdx.x;
+    if (here >= n_coarse)
+        return;
+    int joined[FACES];
+    float sum[FACES], loop = 0.0f, total = 0.0f;
+    int empty = 1;
+#pragma unroll
+    for (int k = 0; k < FACES; ++k) {
+        joined[k] = n_coarse;
+        sum[k] = 0.0f;
+    }
+    for (int corner = 0; corner < CORNERS; ++corner) {
+        const long long row = children[here * CORNERS + corner];
+        if (row == n_rows)
+            continue;
+        const float* weights = weight + (fine ? tile_system[row / TILE] : row) * FACES;
+        empty = 0;
+        loop += 0.5f * diagonal[row];
+        total += mass[row];
+#pragma unroll
+        for (int k = 0; k < FACES; ++k) {
+            const int other = neighbours[row * FACES + k];
+            if (other == n_rows)
+                continue;
+            const float half = 0.5f * weights[k];
+            if (parent[other] == here) {
+                loop -= half;
+            } else {
+                joined[k] = parent[other];
+                sum[k] += half;
+            }
+        }
+    }
+#pragma unroll
+    for (int k = 0; k < FACES; ++k) {
+        table[here * FACES + k] = joined[k];
+        coarse_weight[here * FACES + k] = sum[k];
+    }
+    coarse_diagonal[here] = empty ? 1.0f : loop;
+    coarse_mass[here] = total;
+}
