@@ -15,6 +15,7 @@ from spem.fields.operator import assemble
 from spem.fields.solvers.cg import ConjugateGradient
 from spem.fields.solvers.direct import Direct
 from spem.fields.solvers.explicit import ExplicitIteration
+from spem.fields.solvers.gradients import MultigridGradients
 from spem.fields.solvers.sweep import Sweep
 from spem.shapes.shape import Cuts, Shape
 
@@ -22,6 +23,7 @@ SOLVERS = {
     "direct": Direct(),
     "cg": ConjugateGradient(rtol=1e-12),
     "explicit": ExplicitIteration(rtol=1e-11),
+    "multigrid": MultigridGradients(rtol=1e-12),
     "sweep": Sweep(rtol=1e-10),
 }
 EXACT = 1e-8  # what all of them reach on the small shapes below
@@ -91,7 +93,13 @@ def test_unit_of_length_does_not_matter(solver):
 
 
 @pytest.mark.parametrize(
-    "cheap", [ConjugateGradient(max_iterations=2), ExplicitIteration(max_iterations=3), Sweep(max_blocks=0)]
+    "cheap",
+    [
+        ConjugateGradient(max_iterations=2),
+        ExplicitIteration(max_iterations=3),
+        MultigridGradients(max_iterations=2),
+        Sweep(max_blocks=0),
+    ],
 )
 def test_failure_is_a_value_and_then_an_error(cheap):
     """A solve that misses its tolerance says so, and the error carries its best iterate."""

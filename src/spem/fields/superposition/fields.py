@@ -153,7 +153,8 @@ def source_values(
 ) -> NDArray[np.float64]:
     """Solve for the fields themselves, ``(n_sources, n_nodes)``, by any solver that takes single sources.
 
-    They are as right as the solver makes them; `ConjugateGradient` only relative to each field's maximum.
+    They are as right as the solver makes them; of iterations, `MultigridGradients` and `ConjugateGradient`,
+    only relative to each field's maximum.
 
     Parameters
     ----------

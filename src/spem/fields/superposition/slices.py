@@ -115,7 +115,7 @@ def source_solver(solver: Any = None) -> SourceSolver:
     if not hasattr(solver, "prepare"):
         msg = (
             f"solver={type(solver).__name__}: solves for the whole boundary only; for single sources use "
-            "Direct, or ConjugateGradient for plain values"
+            "Direct, or MultigridGradients or ConjugateGradient for plain values"
         )
         raise ParameterError(msg)
     return solver  # type: ignore[no-any-return]

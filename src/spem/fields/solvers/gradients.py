@@ -1,0 +1,199 @@
+"""Conjugate gradients for many sources, eight at a time, with multigrid as preconditioner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.errors import ConvergenceError, ParameterError, SizeError
+from spem.fields.operator import System
+from spem.fields.solvers.engine import LANES, Backend
+from spem.fields.solvers.host import Host
+from spem.fields.solvers.protocol import Solution
+from spem.fields.solvers.refinement import Refined, refine
+
+# On a device groups are solved together up to so many nodes: enough that kernels outlast their launches.
+_BATCH_NODES = 4_000_000
+# In units of the spacing; single precision holds the square of its inverse.
+_LEAST_RHO = 1e-6
+
+
+@dataclass(frozen=True)
+class MultigridGradients:
+    """Conjugate gradients with the V-cycle of the sweep as preconditioner, eight right-hand sides at a time.
+
+    Iterations run in single precision; their sum is refined in double until the true residual is below the
+    tolerance. No memory but a few vectors is needed, and the time grows with the nodes, so it is for single
+    sources of shapes that are too large to factor, and for devices. Fields of single sources are right
+    relative to their maximum only: for logarithms, as parts need them, take `Direct`.
+
+    Parameters
+    ----------
+    rtol
+        Tolerance on ‖b - (A + M/ρ²) v‖ / ‖b‖ of each single source, and on `deficit_residual` of each field
+        of the whole boundary.
+    max_iterations
+        Limit for each right-hand side.
+    threads
+        Threads for large shapes on the host; as many as the process may use when None. Results do not depend
+        on it.
+    device
+        Where to run; the host when None. A device takes several groups of eight at once, as many as fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from spem.fields.operator import assemble
+    >>> from spem.shapes.shape import Shape
+    >>> system = assemble(Shape.from_mask(np.ones(3)), "voxel")
+    >>> MultigridGradients().solve(system, np.array([1.0, np.inf])).values.round(3)
+    array([[0.429, 1.   ],
+           [0.286, 1.   ],
+           [0.429, 1.   ]])
+    """
+
+    entrywise: ClassVar[bool] = False
+
+    rtol: float = 1e-10
+    max_iterations: int = 200
+    threads: int | None = None
+    device: Backend | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.rtol < 1:
+            msg = f"rtol={self.rtol:g}: expected a tolerance between 0 and 1"
+            raise ParameterError(msg)
+        if self.max_iterations < 1:
+            msg = f"max_iterations={self.max_iterations}: expected at least one"
+            raise ParameterError(msg)
+        if self.threads is not None and self.threads < 1:
+            msg = f"threads={self.threads}: expected at least one thread"
+            raise ParameterError(msg)
+
+    def solve(self, system: System, rho: NDArray[np.float64]) -> Solution:
+        """Iterate for the deficits 1 - v, eight ρ at a time, from v = 1, the solution for ρ = inf.
+
+        Raises
+        ------
+        ParameterError
+            If a ρ is below a millionth of the spacing.
+        SizeError
+            If the system does not fit into the memory of the device.
+        """
+        finite = np.isfinite(rho)
+        _require_rho(system, rho)
+        shifts = rho[finite] ** -2.0
+        outcome = _solve(self, system, system.mass[:, None] * shifts, shifts)
+        values, residual = np.ones((system.n_nodes, rho.size)), np.zeros(rho.size)
+        values[:, finite] -= outcome.values
+        residual[finite] = outcome.residual
+        converged, spent = bool(np.all(residual <= self.rtol)), int(outcome.spent.sum())
+        return Solution(
+            values, residual, converged, spent, f"raise rtol={self.rtol:g} or max_iterations, or use Direct"
+        )
+
+    def prepare(self, system: System, shift: float) -> PreparedMultigrid:
+        """Take A + shift·M; the result's ``solve`` takes any number of right-hand sides as columns.
+
+        Raises
+        ------
+        ParameterError
+            If 1/√shift is below a millionth of the spacing.
+        """
+        _require_rho(system, np.array([shift]) ** -0.5 if shift > 0 else np.array([np.inf]))
+        return PreparedMultigrid(system, shift, self)
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedMultigrid:
+    """One matrix for conjugate gradients with multigrid; safe to use from several threads.
+
+    Parameters
+    ----------
+    system
+        The system.
+    shift
+        1/ρ², 0 for ρ = inf.
+    solver
+        Tolerance, limits and device.
+    """
+
+    system: System
+    shift: float
+    solver: MultigridGradients
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held between solves: none, because the hierarchy costs about one iteration to make."""
+        return 0
+
+    def solve(self, rhs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Iterate for each column from zero.
+
+        Raises
+        ------
+        ConvergenceError
+            If one misses the tolerance; it carries the outcome for all columns.
+        SizeError
+            If eight columns do not fit into the memory of the device.
+        """
+        columns = rhs.reshape(self.system.n_nodes, -1)
+        values, residual, spent = _solve(
+            self.solver, self.system, columns, np.full(columns.shape[1], self.shift)
+        )
+        if not np.all(residual <= self.solver.rtol):
+            worst, limit = residual.max(initial=0.0), spent.max(initial=0)
+            msg = (
+                f"{self.system.shape.name}: residual {worst:.1e} of a source's field after {limit} "
+                f"iterations; raise rtol={self.solver.rtol:g} or max_iterations, or solve with Direct"
+            )
+            raise ConvergenceError(msg, Solution(values, residual, False, int(spent.sum())))
+        return values.reshape(rhs.shape)
+
+
+def _require_rho(system: System, rho: NDArray[np.float64]) -> None:
+    """Refuse ρ that single precision cannot hold."""
+    unit = min(system.shape.spacing)
+    if rho.min(initial=np.inf) < _LEAST_RHO * unit:
+        msg = (
+            f"{system.shape.name}: rho={rho.min():g} is below {_LEAST_RHO:g} of the spacing {unit:g}, "
+            "where fields vanish on every node; use a larger rho or a finer spacing"
+        )
+        raise ParameterError(msg)
+
+
+def _solve(
+    solver: MultigridGradients, system: System, rhs: NDArray[np.float64], shifts: NDArray[np.float64]
+) -> Refined:
+    """Solve (A + shift M) v = rhs, a shift a column, in batches of groups of `LANES`."""
+    backend: Backend = Host(solver.threads) if solver.device is None else solver.device
+    count = rhs.shape[1]
+    found = Refined(np.zeros(rhs.shape), np.zeros(count), np.zeros(count, np.int64))
+    most = 1 if solver.device is None else max(_BATCH_NODES // system.n_nodes, 1)
+    copies, start, engine = min(most, -(-count // LANES)), 0, None
+    try:
+        while start < count:
+            part = slice(start, min(start + copies * LANES, count))
+            try:
+                engine = engine or backend.open([system] * copies, np.float32)
+                outcome = refine(
+                    engine, rhs[:, part], shifts[part], rtol=solver.rtol, limit=solver.max_iterations
+                )
+            except SizeError:
+                if copies == 1:
+                    raise
+                copies //= 2
+                if engine is not None:
+                    engine.close()
+                engine = None
+                continue
+            for whole, piece in zip(found, outcome, strict=True):
+                whole[..., part] = piece
+            start = part.stop
+    finally:
+        if engine is not None:
+            engine.close()
+    return found
