@@ -1,0 +1,396 @@
+// A CPU that runs CUDA kernels of one-dimensional grids and static shared memory, one thread at a time.
+//
+// Every thread of a block runs on a fiber until a barrier or a shuffle stops it; a fiber that meets none takes the
+// next thread, so kernels without barriers never switch. Between barriers, threads run forward, backward or
+// shuffled, and so do blocks: a kernel whose result depends on it has a race. Shared memory is poisoned before each
+// block. Threads that wait for others that have returned, or that wait elsewhere, are an error.
+#pragma once
+#include <math.h>
+#include <setjmp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <tuple>
+#include <ucontext.h>
+#include <utility>
+#if defined(__SANITIZE_ADDRESS__)
+#include <sanitizer/common_interface_defs.h>
+#endif
+
+#define __global__
+#define __device__
+#define __host__
+#define __forceinline__ inline
+#define __noinline__ __attribute__((noinline))
+#define __launch_bounds__(...)
+#define __shared__ static __attribute__((section("cuda_shared")))
+#define __constant__ static
+#define __align__(n) __attribute__((aligned(n)))
+#define __syncthreads() simulator::barrier(-1, __FILE__, __LINE__)
+#define __syncwarp(...) simulator::barrier((int)threadIdx.x / 32, __FILE__, __LINE__)
+#define __shfl_sync(mask, value, ...) simulator::shuffle(simulator::at, mask, value, __FILE__, __LINE__, __VA_ARGS__)
+#define __shfl_xor_sync(mask, value, ...) \
+    simulator::shuffle(simulator::flip, mask, value, __FILE__, __LINE__, __VA_ARGS__)
+#define __shfl_down_sync(mask, value, ...) \
+    simulator::shuffle(simulator::down, mask, value, __FILE__, __LINE__, __VA_ARGS__)
+#define __shfl_up_sync(mask, value, ...) simulator::shuffle(simulator::up, mask, value, __FILE__, __LINE__, __VA_ARGS__)
+#define __ballot_sync(mask, test) simulator::ballot(mask, test, __FILE__, __LINE__)
+#define __any_sync(mask, test) (simulator::ballot(mask, test, __FILE__, __LINE__) != 0)
+#define __all_sync(mask, test) (simulator::ballot(mask, test, __FILE__, __LINE__) == 0xffffffffu)
+
+extern char __start_cuda_shared[] __attribute__((weak));
+extern char __stop_cuda_shared[] __attribute__((weak));
+
+namespace {
+
+struct dim3 {
+    unsigned x, y, z;
+};
+dim3 threadIdx{0, 0, 0}, blockIdx{0, 0, 0}, blockDim{1, 1, 1}, gridDim{1, 1, 1};
+constexpr int warpSize = 32;
+
+template <typename T>
+struct alignas(2 * sizeof(T)) Vector2 {
+    T x, y;
+};
+template <typename T>
+struct Vector3 {
+    T x, y, z;
+};
+template <typename T>
+struct alignas(16) Vector4 {
+    T x, y, z, w;
+};
+using float2 = Vector2<float>;
+using float3 = Vector3<float>;
+using float4 = Vector4<float>;
+using double2 = Vector2<double>;
+using int2 = Vector2<int>;
+using int3 = Vector3<int>;
+using int4 = Vector4<int>;
+using uint2 = Vector2<unsigned>;
+using uint4 = Vector4<unsigned>;
+inline float2 make_float2(float x, float y) { return {x, y}; }
+inline float3 make_float3(float x, float y, float z) { return {x, y, z}; }
+inline float4 make_float4(float x, float y, float z, float w) { return {x, y, z, w}; }
+inline double2 make_double2(double x, double y) { return {x, y}; }
+inline int2 make_int2(int x, int y) { return {x, y}; }
+inline int3 make_int3(int x, int y, int z) { return {x, y, z}; }
+inline int4 make_int4(int x, int y, int z, int w) { return {x, y, z, w}; }
+
+#define SIMULATOR_EXTREMES(T)                         \
+    inline T min(T a, T b) { return b < a ? b : a; } \
+    inline T max(T a, T b) { return a < b ? b : a; }
+SIMULATOR_EXTREMES(int)
+SIMULATOR_EXTREMES(unsigned)
+SIMULATOR_EXTREMES(long)
+SIMULATOR_EXTREMES(unsigned long)
+SIMULATOR_EXTREMES(long long)
+SIMULATOR_EXTREMES(unsigned long long)
+inline float min(float a, float b) { return fminf(a, b); }
+inline float max(float a, float b) { return fmaxf(a, b); }
+inline double min(double a, double b) { return fmin(a, b); }
+inline double max(double a, double b) { return fmax(a, b); }
+inline float rsqrtf(float a) { return 1.0f / sqrtf(a); }
+inline double rsqrt(double a) { return 1.0 / sqrt(a); }
+inline float __fdividef(float a, float b) { return a / b; }
+inline float __frcp_rn(float a) { return 1.0f / a; }
+inline float __fmul_rn(float a, float b) { return a * b; }
+inline float __fadd_rn(float a, float b) { return a + b; }
+inline float __fmaf_rn(float a, float b, float c) { return fmaf(a, b, c); }
+inline double __dmul_rn(double a, double b) { return a * b; }
+inline double __dadd_rn(double a, double b) { return a + b; }
+inline double __fma_rn(double a, double b, double c) { return fma(a, b, c); }
+inline int __popc(unsigned a) { return __builtin_popcount(a); }
+inline int __popcll(unsigned long long a) { return __builtin_popcountll(a); }
+inline int __ffs(int a) { return __builtin_ffs(a); }
+inline int __clz(int a) { return a ? __builtin_clz((unsigned)a) : 32; }
+
+template <typename To, typename From>
+inline To same_bits(From from) {
+    static_assert(sizeof(To) == sizeof(From));
+    To to;
+    memcpy(&to, &from, sizeof to);
+    return to;
+}
+inline int __float_as_int(float a) { return same_bits<int>(a); }
+inline unsigned __float_as_uint(float a) { return same_bits<unsigned>(a); }
+inline float __int_as_float(int a) { return same_bits<float>(a); }
+inline float __uint_as_float(unsigned a) { return same_bits<float>(a); }
+inline long long __double_as_longlong(double a) { return same_bits<long long>(a); }
+inline double __longlong_as_double(long long a) { return same_bits<double>(a); }
+
+template <typename T>
+inline T __ldg(const T* place) { return *place; }
+template <typename T>
+inline T __ldcg(const T* place) { return *place; }
+template <typename T>
+inline T __ldcs(const T* place) { return *place; }
+template <typename T>
+inline void __stcs(T* place, T value) { *place = value; }
+template <typename T>
+inline void __stcg(T* place, T value) { *place = value; }
+inline void __threadfence() {}
+inline void __threadfence_block() {}
+
+// The value before, as CUDA's atomics return it.
+template <typename T>
+inline T exchange(T* place, T value) {
+    const T before = *place;
+    *place = value;
+    return before;
+}
+template <typename T, typename U>
+inline T atomicAdd(T* place, U value) { return exchange(place, (T)(*place + (T)value)); }
+template <typename T, typename U>
+inline T atomicSub(T* place, U value) { return exchange(place, (T)(*place - (T)value)); }
+template <typename T, typename U>
+inline T atomicMin(T* place, U value) { return exchange(place, (T)value < *place ? (T)value : *place); }
+template <typename T, typename U>
+inline T atomicMax(T* place, U value) { return exchange(place, *place < (T)value ? (T)value : *place); }
+template <typename T, typename U>
+inline T atomicOr(T* place, U value) { return exchange(place, (T)(*place | (T)value)); }
+template <typename T, typename U>
+inline T atomicAnd(T* place, U value) { return exchange(place, (T)(*place & (T)value)); }
+template <typename T, typename U>
+inline T atomicExch(T* place, U value) { return exchange(place, (T)value); }
+template <typename T, typename U, typename V>
+inline T atomicCAS(T* place, U expected, V value) {
+    return exchange(place, *place == (T)expected ? (T)value : *place);
+}
+
+}  // namespace
+
+namespace simulator {
+namespace {
+
+constexpr int threads = 256, warps = threads / 32;
+constexpr size_t stack_bytes = 256 << 10;
+
+struct Fiber {
+    jmp_buf state;
+    ucontext_t start;
+    bool started = false;
+    char* stack = nullptr;
+};
+
+struct Place {
+    const char* file;
+    int line;
+};
+
+void (*body)(void**);
+void** body_arguments;
+Fiber fibers[threads];
+jmp_buf home;
+Fiber* idle[threads];
+Fiber* owner[threads];  // of each thread that waits or runs
+int idle_count, ready[threads * 2], ready_first, ready_count, next, done, current;
+int turn[threads];                    // the order of threads
+int waiting_block, waiting_warp[warps];
+Place where_block, where_warp[warps], waits[threads];
+bool waits_here[threads], mixed;
+int mode;
+unsigned long long random_state;
+alignas(16) char slots[2][threads][16];
+unsigned char parity[threads];
+char message[512];
+
+unsigned draw(unsigned below) {
+    random_state = random_state * 6364136223846793005ull + 1442695040888963407ull;
+    return (unsigned)((random_state >> 33) % below);
+}
+
+// The numbers 0 .. n - 1 as the mode has them.
+void arrange(int* list, int n) {
+    for (int i = 0; i < n; i++) list[i] = mode == 1 ? n - 1 - i : i;
+    if (mode == 2)
+        for (int i = n - 1; i > 0; i--) std::swap(list[i], list[draw(i + 1)]);
+}
+
+void leave(Fiber* fiber);
+
+// Life of a fiber: it runs threads that have not begun, and when there are none, waits idle.
+void work() {
+    for (;;) {
+        threadIdx.x = (unsigned)current;
+        body(body_arguments);
+        done++;
+        Fiber* const fiber = owner[current];
+        owner[current] = nullptr;
+        if (ready_count == 0 && next < threads) {
+            current = turn[next++];
+            owner[current] = fiber;
+            continue;
+        }
+        idle[idle_count++] = fiber;
+        leave(fiber);
+    }
+}
+
+[[noreturn]] void enter(Fiber* fiber) {
+    if (fiber == nullptr) _longjmp(home, 1);
+    if (fiber->started) _longjmp(fiber->state, 1);
+    fiber->started = true;
+    setcontext(&fiber->start);
+    abort();
+}
+
+// The fiber to run next: of a thread that is ready, or an idle one with a thread that has not begun; null if none.
+Fiber* choose() {
+    if (ready_count) {
+        current = ready[ready_first];
+        ready_first = (ready_first + 1) % (2 * threads);
+        ready_count--;
+        return owner[current];
+    }
+    if (next < threads) {
+        current = turn[next++];
+        return owner[current] = idle[--idle_count];
+    }
+    return nullptr;
+}
+
+__attribute__((noinline)) void leave(Fiber* fiber) {
+    Fiber* const chosen = choose();
+    if (chosen == fiber) return;
+    if (_setjmp(fiber->state) == 0) enter(chosen);
+}
+
+void wake(int first, int count) {
+    int list[threads];
+    arrange(list, count);
+    for (int i = 0; i < count; i++) {
+        ready[(ready_first + ready_count++) % (2 * threads)] = first + list[i];
+        waits_here[first + list[i]] = false;
+    }
+}
+
+// Wait for the other threads of a warp, or of the block (warp -1).
+__attribute__((noinline)) void barrier(int warp, const char* file, int line) {
+    const int thread = current;
+    int& waiting = warp < 0 ? waiting_block : waiting_warp[warp];
+    Place& where = warp < 0 ? where_block : where_warp[warp];
+    const int count = warp < 0 ? threads : 32;
+    if (waiting == 0) where = {file, line};
+    mixed |= where.line != line || strcmp(where.file, file) != 0;
+    waits[thread] = {file, line};
+    waits_here[thread] = true;
+    if (mixed) _longjmp(home, 1);
+    if (++waiting == count) {
+        waiting = 0;
+        wake(warp < 0 ? 0 : 32 * warp, count);
+    }
+    leave(owner[thread]);
+    threadIdx.x = (unsigned)thread;
+}
+
+enum Move { at, flip, down, up };
+
+// What another lane of the warp passes; two sets of slots, so that one barrier is enough.
+template <typename T>
+T shuffle(Move move, unsigned mask, T value, const char* file, int line, int by, int width = 32) {
+    static_assert(sizeof(T) <= 16);
+    if (mask != 0xffffffffu) {
+        snprintf(message, sizeof message, "%s:%d: a shuffle of a part of a warp is not simulated", file, line);
+        _longjmp(home, 2);
+    }
+    const int thread = current, lane = thread % 32, base = lane / width * width;
+    char(*slot)[16] = slots[parity[thread] ^= 1];
+    memcpy(slot[thread], &value, sizeof value);
+    barrier(thread / 32, file, line);
+    int from = move == at ? base + by % width : move == flip ? lane ^ by : move == down ? lane + by : lane - by;
+    if (from < base || from >= base + width) from = lane;
+    memcpy(&value, slot[thread - lane + from], sizeof value);
+    return value;
+}
+
+inline unsigned ballot(unsigned mask, bool test, const char* file, int line) {
+    unsigned votes = (unsigned)test << (current % 32);
+    for (int step = 1; step < 32; step *= 2) votes |= shuffle(flip, mask, votes, file, line, step);
+    return votes;
+}
+
+void prepare_fibers() {
+    for (Fiber& fiber : fibers) {
+        if (!fiber.stack) {
+            const int flags = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE;
+            fiber.stack = (char*)mmap(nullptr, stack_bytes, PROT_READ | PROT_WRITE, flags, -1, 0);
+            if (fiber.stack == (char*)MAP_FAILED) abort();
+        }
+        getcontext(&fiber.start);
+        fiber.start.uc_stack.ss_sp = fiber.stack;
+        fiber.start.uc_stack.ss_size = stack_bytes;
+        fiber.start.uc_link = nullptr;
+        makecontext(&fiber.start, work, 0);
+        fiber.started = false;
+    }
+    idle_count = 0;
+    for (int i = threads - 1; i >= 0; i--) idle[idle_count++] = &fibers[i];
+}
+
+void tell(const char* name) {
+    int thread = 0;
+    while (thread < threads - 1 && !waits_here[thread]) thread++;
+    snprintf(message, sizeof message,
+             mixed ? "kernel %s, block %u: threads of one block wait at different barriers, thread %d at %s:%d"
+                   : "kernel %s, block %u: threads wait for others that never come, thread %d at %s:%d",
+             name, blockIdx.x, thread, waits[thread].file, waits[thread].line);
+}
+
+// Run one block; false when its threads could not all come to their end.
+__attribute__((noinline)) bool run_block(const char* name) {
+    if (__start_cuda_shared) memset(__start_cuda_shared, 0xff, (size_t)(__stop_cuda_shared - __start_cuda_shared));
+    arrange(turn, threads);
+    next = done = ready_count = ready_first = waiting_block = 0;
+    memset(waiting_warp, 0, sizeof waiting_warp);
+    mixed = false;
+    const int came = _setjmp(home);
+    if (came == 0) enter(choose());
+    if (done == threads) return true;
+    if (came != 2) tell(name);
+    memset(waits_here, 0, sizeof waits_here);
+    prepare_fibers();
+    return false;
+}
+
+// Run a grid; null, or what went wrong.
+const char* run(const char* name, void (*call)(void**), void** arguments, int n_blocks, int order, unsigned seed) {
+    static bool prepared = (prepare_fibers(), true);
+    (void)prepared;
+    body = call;
+    body_arguments = arguments;
+    mode = order;
+    random_state = seed;
+    blockDim.x = threads;
+    gridDim.x = (unsigned)n_blocks;
+    int* const blocks = (int*)malloc(sizeof(int) * (size_t)n_blocks);
+    arrange(blocks, n_blocks);
+    bool good = true;
+    for (int i = 0; i < n_blocks && good; i++) {
+        blockIdx.x = (unsigned)blocks[i];
+        good = run_block(name);
+    }
+    free(blocks);
+    return good ? nullptr : message;
+}
+
+template <auto kernel, typename... P, size_t... I>
+void unpack(void (*)(P...), void** arguments, std::index_sequence<I...>) {
+    kernel(*static_cast<P*>(arguments[I])...);
+    (void)arguments;
+}
+
+template <auto kernel, typename... P>
+void call_with(void** arguments, void (*type)(P...)) {
+    unpack<kernel>(type, arguments, std::index_sequence_for<P...>());
+}
+
+template <auto kernel>
+void call(void** arguments) {
+    call_with<kernel>(arguments, kernel);
+}
+
+}  // namespace
+}  // namespace simulator
