@@ -75,11 +75,12 @@ def _domain(shape: Shape, *, use_cuts: bool, default: float) -> Domain:
     n = shape.n_nodes
     number = np.full(shape.mask.size, n, np.int32)
     number[shape.voxels] = np.arange(n, dtype=np.int32)
-    strides = np.array([int(np.prod(shape.mask.shape[a + 1 :])) for a in range(shape.ndim)])
+    strides = [int(np.prod(shape.mask.shape[a + 1 :])) for a in range(shape.ndim)]
+    steps = np.array([sign * stride for stride in strides for sign in (-1, 1)])  # by direction
     cuts = shape.cuts
     keep = slice(None) if use_cuts else slice(0)
     neighbours, fraction = _connect(
-        shape.voxels, number, strides, cuts.voxel[keep], cuts.direction[keep], cuts.fraction[keep], default
+        shape.voxels, number, steps, cuts.voxel[keep], cuts.direction[keep], cuts.fraction[keep], default
     )
     return Domain(neighbours, fraction)
 
@@ -88,31 +89,37 @@ def _domain(shape: Shape, *, use_cuts: bool, default: float) -> Domain:
 def _connect(
     voxels: NDArray[np.int64],
     number: NDArray[np.int32],
-    strides: NDArray[np.int64],
+    steps: NDArray[np.int64],
     cut_voxel: NDArray[np.int64],
     cut_direction: NDArray[np.uint8],
     cut_fraction: NDArray[np.float64],
     default: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Neighbour table and boundary fractions; nodes and cuts are both in ascending order of voxel."""
-    n, d = voxels.size, strides.size
-    neighbours = np.empty((n, 2 * d), np.int32)
+    n, width = voxels.size, steps.size
+    neighbours = np.empty((n, width), np.int32)
     fraction = np.empty(cut_voxel.size + 16, np.float64)
     n_edges = 0
     cut = 0
     for i in range(n):
-        while cut < cut_voxel.size and cut_voxel[cut] < voxels[i]:
+        voxel = voxels[i]
+        while cut < cut_voxel.size and cut_voxel[cut] < voxel:
             cut += 1
-        for k in range(2 * d):
-            step = strides[k // 2] if k % 2 else -strides[k // 2]
-            j = number[voxels[i] + step]
+        inner = cut == cut_voxel.size or cut_voxel[cut] > voxel
+        for k in range(width):
+            # Masks are framed, so this is in range; an unsigned index is not tested for wrapping.
+            j = number[np.uint64(voxel + steps[k])]
+            neighbours[i, k] = j
+            inner &= j != n
+        if inner:
+            continue
+        for k in range(width):
             theta = default
-            if cut < cut_voxel.size and cut_voxel[cut] == voxels[i] and cut_direction[cut] == k:
+            if cut < cut_voxel.size and cut_voxel[cut] == voxel and cut_direction[cut] == k:
                 theta = cut_fraction[cut]
                 cut += 1
-                j = n
-            neighbours[i, k] = j
-            if j == n:
+                neighbours[i, k] = n
+            if neighbours[i, k] == n:
                 if n_edges == fraction.size:
                     grown = np.empty(2 * n_edges, np.float64)
                     grown[:n_edges] = fraction

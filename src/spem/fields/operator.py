@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 import scipy.sparse
+from numba import njit
 from numpy.typing import NDArray
 
 from spem.errors import ParameterError, require_kind
@@ -108,9 +109,33 @@ def assemble(shape: Shape, boundary: Boundary = "surface") -> System:
         raise ParameterError(msg)
     domain = _DOMAINS[boundary](shape)
     weights = 1.0 / np.square(shape.spacing)
-    node, direction = domain.boundary_edges
-    cut = weights[direction // 2]
-    rhs = np.bincount(node, cut / domain.fraction, domain.n_nodes).astype(np.float64)
-    diagonal = 2 * weights.sum() - np.bincount(node, cut, domain.n_nodes) + rhs
-    mass = 1 - np.bincount(node, 1 - domain.fraction, domain.n_nodes) / (2 * shape.ndim)
+    rhs, diagonal, mass = _eliminate(domain.neighbours, domain.fraction, weights)
     return System(shape, domain, weights, rhs, diagonal, mass, boundary)
+
+
+@njit(cache=True, nogil=True)
+def _eliminate(
+    neighbours: NDArray[np.int32], fraction: NDArray[np.float64], weights: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Right-hand side b, diagonal of A and diagonal of M, from the boundary edges of each node."""
+    n, width = neighbours.shape
+    rhs, diagonal, mass = np.empty(n), np.empty(n), np.empty(n)
+    whole = 2 * weights.sum()
+    edge = 0
+    for i in range(n):
+        inner = True
+        for k in range(width):
+            inner &= neighbours[i, k] != n
+        source = cut = missing = 0.0
+        if not inner:
+            for k in range(width):
+                if neighbours[i, k] == n:
+                    theta = fraction[edge]
+                    edge += 1
+                    source += weights[k // 2] / theta
+                    cut += weights[k // 2]
+                    missing += 1 - theta
+        rhs[i] = source
+        diagonal[i] = whole - cut + source
+        mass[i] = 1 - missing / width
+    return rhs, diagonal, mass
