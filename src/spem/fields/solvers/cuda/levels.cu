@@ -4,10 +4,10 @@
 // write the same word write the same value, so levels do not depend on the order of threads. A position is
 // the flat C-order index of a voxel, or block, in the grid of its system; -1 marks padding rows.
 //
-// Bytes moved, per node of the finest level and for DIM = 3: colours 9, their cumulative sum 5, rows 33,
-// neighbours 76 and as many gathered, values 56; per level, for each of its own rows: marks 13, joins 25, and
-// for each coarse row 32 + 8 * 64 of the finer rows, and 116 written. About 0.4 kB a node in all, of which a
-// V-cycle moves some 0.3 kB.
+// Bytes moved for DIM = 3, what is filled before included: per node of the finest level 9 for colours, 5 for
+// their sums, 33 for rows, 100 for neighbours and 72 for values; then per row of each level 9 for marks, 28 for
+// joins and 84 for the coarser graph (60 on the finest, which has no weights), per cell of the grid of blocks 6,
+// per coarse row 96. That is about 350 bytes a node of a solid shape, once.
 
 #include "common.cuh"
 
@@ -147,8 +147,8 @@ extern "C" __global__ void join_blocks(const long long* position, const int* til
 
 // The Galerkin graph of unsmoothed aggregation with the Laplacian halved, for piecewise constants overestimate
 // the stiffness by two a level, the mass not at all. One thread a coarse row, over its children in C order:
-// reads 4 bytes a child and, of each, its graph and the parents of its neighbours (8 + 16 DIM, 4 less a weight
-// on the finest level), writes the coarse graph (8 + 16 DIM).
+// reads each child's number, graph and the parents of its neighbours (12 + 24 DIM bytes, on the finest level 8 DIM
+// fewer), writes the coarse graph (8 + 16 DIM).
 extern "C" __global__ void coarsen(const int* children, const int* parent, const int* neighbours,
                                    const float* weight, const float* diagonal, const float* mass,
                                    const int* tile_system, int fine, int n_rows, int n_coarse, int* table,
