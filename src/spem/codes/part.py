@@ -91,7 +91,7 @@ class Part:
         """Length of a code."""
         return self.settings.levels * self.settings.moments * sum(words.size for words in self.centers)
 
-    def encode(self, bands: Any, name: str, model: str) -> NDArray[np.float64]:
+    def encode(self, bands: Any, name: str, model: str = "of this part") -> NDArray[np.float64]:
         """Make the code ``(n_code,)`` of the bands of this kind; `name` and `model` are for messages."""
         checked = as_bands(bands, name)
         found, expected = [m.shape[1] for m in checked], [words.shape[1] for words in self.centers]

@@ -1,0 +1,154 @@
+"""Maps and codes of a batch of swept shapes, made on the device that holds their fields.
+
+`spem.codes.vlad` says what is computed; here nodes are rows of tables on a device, and only sums over the
+nodes of each word leave it. They do not depend on what else is in the batch, bit by bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spem.codes.bands import Bands
+from spem.codes.features import band_rho, node_features
+from spem.codes.part import Part
+from spem.codes.settings import Settings
+from spem.codes.word_sums import Kept, Rows, WordSums
+from spem.embedding.maps import principal_components
+from spem.errors import ParameterError, SizeError
+from spem.fields.solvers.batch import Batch
+from spem.fields.solvers.cuda.runtime import Array, Runtime
+
+
+def project_maps(batch: Batch, settings: Settings, band: int) -> Array:
+    """Compute the maps of one band of all shapes of a batch.
+
+    Parameters
+    ----------
+    batch
+        Shapes swept over the ρ of all bands, on a device.
+    settings
+        Settings of SPEM maps.
+    band
+        Which range of ρ.
+
+    Returns
+    -------
+    Array
+        ``(n_rows, n_maps)`` float32 on the device.
+    """
+    constant, mix = [], []
+    for index, (system, reduced) in enumerate(zip(batch.systems, batch.reduced, strict=True)):
+        rho = band_rho(system.shape, settings, band)
+        found = principal_components(
+            reduced.gram,
+            batch.coefficients(index, rho),
+            rho,
+            system.n_nodes,
+            settings.n_maps,
+            centred=settings.centred,
+        )
+        constant.append(found.mix[0])
+        mix.append(reduced.turn @ found.mix[1:])
+    engine: Any = batch.engine
+    return engine.project(np.stack(constant), np.stack(mix))
+
+
+def batch_features(batch: Batch, settings: Settings, kept: Sequence[Kept]) -> list[Bands]:
+    """Compute the node features of all shapes of a batch, on the host.
+
+    Parameters
+    ----------
+    batch
+        Shapes swept over the ρ of all bands, on a device or on the processor.
+    settings
+        Settings of SPEM maps.
+    kept
+        For each shape ``(n_nodes,)`` whether a node counts.
+
+    Returns
+    -------
+    list
+        For each shape what `spem.codes.features.node_features` returns.
+
+    Raises
+    ------
+    SizeError
+        When they do not fit into the memory of the device.
+    """
+    engine: Any = batch.engine
+    if not hasattr(engine, "project"):
+        return [node_features(field, settings) for field in batch.hyperfields()]
+    with _memory(engine.runtime, batch):
+        bands = [
+            engine.to_nodes(project_maps(batch, settings, band)) for band in range(len(settings.rho_ranges))
+        ]
+    return [
+        tuple(np.ascontiguousarray(maps[keep], np.float32) for maps in shape)
+        for *shape, keep in zip(*bands, kept, strict=True)
+    ]
+
+
+def batch_codes(batch: Batch, part: Part, kept: Sequence[Kept]) -> list[NDArray[np.float64]]:
+    """Make the codes of all shapes of a batch.
+
+    Parameters
+    ----------
+    batch
+        Shapes swept over the ρ of all bands, on a device or on the processor.
+    part
+        What a model has learnt of SPEM maps.
+    kept
+        For each shape ``(n_nodes,)`` whether a node counts.
+
+    Returns
+    -------
+    list
+        For each shape ``(n_code,)``, as `Part.encode` returns it.
+
+    Raises
+    ------
+    ParameterError
+        When maps are not finite.
+    SizeError
+        When they do not fit into the memory of the device.
+    """
+    engine: Any = batch.engine
+    if not hasattr(engine, "project"):
+        features = batch_features(batch, part.settings, kept)
+        return [
+            part.encode(bands, system.shape.name)
+            for bands, system in zip(features, batch.systems, strict=True)
+        ]
+    with _memory(engine.runtime, batch):
+        rows = Rows.of(engine, kept)
+        bands = [
+            WordSums.of(part, band, rows, engine.runtime)(project_maps(batch, part.settings, band))
+            for band in range(len(part.centers))
+        ]
+    codes = []
+    for system, *found in zip(batch.systems, *bands, strict=True):
+        if not all(np.isfinite(each.squares).all() for each in found):
+            msg = f"the maps of {system.shape.name} contain NaN or inf; they must be finite"
+            raise ParameterError(msg)
+        codes.append(part.encode_residuals(found))
+    return codes
+
+
+@contextmanager
+def _memory(runtime: Runtime, batch: Batch) -> Iterator[None]:
+    """Turn a device's want of memory into a `SizeError` that says for what."""
+    try:
+        yield
+    except runtime.memory_errors as error:
+        nodes, count = sum(system.n_nodes for system in batch.systems), len(batch)
+        shapes = "1 shape" if count == 1 else f"{count} shapes"
+        msg = (
+            f"maps of {shapes} of {nodes:,} nodes do not fit on {runtime.name} beside their fields; "
+            "take fewer voxels, or no device"
+        )
+        raise SizeError(msg) from error
