@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from spem.fields.isocontours import iso_contours, iso_surfaces
     from spem.fields.level_curves import level_curvature, turning_angles
     from spem.fields.solvers.cg import ConjugateGradient
+    from spem.fields.solvers.cuda.device import Cuda
     from spem.fields.solvers.direct import Direct
     from spem.fields.solvers.explicit import ExplicitIteration
     from spem.fields.solvers.lanczos import BlockLanczos
@@ -107,6 +108,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "ConjugateGradient",
     "ConvergenceError",
     "CreaturePoses",
+    "Cuda",
     "Cuts",
     "Direct",
     "ErrorCurve",
@@ -236,6 +238,7 @@ _HOME = {
     "ConjugateGradient": "spem.fields.solvers.cg",
     "ConvergenceError": "spem.errors",
     "CreaturePoses": "spem.shapes.landmarks",
+    "Cuda": "spem.fields.solvers.cuda.device",
     "Cuts": "spem.shapes.shape",
     "Direct": "spem.fields.solvers.direct",
     "ErrorCurve": "spem.decomposition.choice",

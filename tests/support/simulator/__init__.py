@@ -1,4 +1,4 @@
-"""A CUDA device that a CPU plays: the package's own kernels compiled by a C++ compiler, over strict arrays."""
+"""A CUDA device that a CPU plays: the package's own kernels made by a C++ compiler, over strict arrays."""
 
 from simulator.backend import Simulated
 from simulator.runtime import SimulatedRuntime

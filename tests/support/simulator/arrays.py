@@ -16,155 +16,29 @@ from numpy.typing import NDArray
 
 from simulator.memory import Guarded, guard, poison
 
-FUNCTIONS = frozenset(
-    [
-        "abs",
-        "absolute",
-        "add",
-        "all",
-        "allclose",
-        "amax",
-        "amin",
-        "any",
-        "arange",
-        "argmax",
-        "argmin",
-        "argpartition",
-        "argsort",
-        "array_equal",
-        "asarray",
-        "ascontiguousarray",
-        "atleast_1d",
-        "atleast_2d",
-        "average",
-        "bincount",
-        "bitwise_and",
-        "bitwise_or",
-        "broadcast_to",
-        "ceil",
-        "clip",
-        "column_stack",
-        "concatenate",
-        "copy",
-        "cos",
-        "count_nonzero",
-        "cumprod",
-        "cumsum",
-        "diag",
-        "diagonal",
-        "diff",
-        "digitize",
-        "divide",
-        "dot",
-        "einsum",
-        "empty",
-        "empty_like",
-        "equal",
-        "exp",
-        "expand_dims",
-        "expm1",
-        "eye",
-        "flatnonzero",
-        "flip",
-        "floor",
-        "floor_divide",
-        "full",
-        "full_like",
-        "greater",
-        "greater_equal",
-        "hstack",
-        "identity",
-        "inner",
-        "invert",
-        "isfinite",
-        "isinf",
-        "isnan",
-        "kron",
-        "less",
-        "less_equal",
-        "lexsort",
-        "linspace",
-        "log",
-        "log1p",
-        "logical_and",
-        "logical_not",
-        "logical_or",
-        "matmul",
-        "max",
-        "maximum",
-        "mean",
-        "median",
-        "min",
-        "minimum",
-        "mod",
-        "moveaxis",
-        "multiply",
-        "nan_to_num",
-        "negative",
-        "nonzero",
-        "not_equal",
-        "ones",
-        "ones_like",
-        "outer",
-        "pad",
-        "partition",
-        "power",
-        "prod",
-        "ravel",
-        "repeat",
-        "reshape",
-        "roll",
-        "round",
-        "searchsorted",
-        "sign",
-        "sin",
-        "sort",
-        "sqrt",
-        "square",
-        "squeeze",
-        "stack",
-        "std",
-        "subtract",
-        "sum",
-        "swapaxes",
-        "take",
-        "take_along_axis",
-        "tensordot",
-        "tile",
-        "trace",
-        "transpose",
-        "tril",
-        "triu",
-        "unique",
-        "var",
-        "vdot",
-        "vstack",
-        "where",
-        "zeros",
-        "zeros_like",
-    ]
-)
-LINALG = frozenset(
-    ["cholesky", "eigh", "eigvalsh", "inv", "lstsq", "norm", "pinv", "qr", "slogdet", "solve", "svd"]
-)
-NAMES = frozenset(
-    [
-        "bool_",
-        "e",
-        "float32",
-        "float64",
-        "inf",
-        "int8",
-        "int32",
-        "int64",
-        "nan",
-        "newaxis",
-        "pi",
-        "uint8",
-        "uint32",
-        "uint64",
-    ]
-)
+_FUNCTIONS = """
+abs absolute add all allclose amax amin any arange argmax argmin argpartition argsort array_equal asarray
+ascontiguousarray atleast_1d atleast_2d average bincount bitwise_and bitwise_or broadcast_to ceil clip
+column_stack concatenate copy cos count_nonzero cumprod cumsum diag diagonal diff digitize divide dot
+einsum empty empty_like equal exp expand_dims expm1 eye flatnonzero flip floor floor_divide full full_like
+greater greater_equal hstack identity inner invert isfinite isinf isnan kron less less_equal lexsort
+linspace log log1p logical_and logical_not logical_or matmul max maximum mean median min minimum mod
+moveaxis multiply nan_to_num negative nonzero not_equal ones ones_like outer pad partition power prod
+ravel repeat reshape roll round searchsorted sign sin sort sqrt square squeeze stack std subtract sum
+swapaxes take take_along_axis tensordot tile trace transpose tril triu unique var vdot vstack where zeros
+zeros_like
+"""
+_LINALG = "cholesky eigh eigvalsh inv lstsq norm pinv qr slogdet solve svd"
+_NAMES = "bool_ e float32 float64 inf int8 int32 int64 nan newaxis pi uint8 uint32 uint64"
+_METHODS = """
+all any argmax argmin argsort astype clip copy cumsum diagonal dot fill max mean min nonzero prod ravel
+repeat reshape round sort squeeze std sum swapaxes take trace transpose var view
+"""
+
+FUNCTIONS = frozenset(_FUNCTIONS.split())
+LINALG = frozenset(_LINALG.split())
+NAMES = frozenset(_NAMES.split())
+METHODS = frozenset(_METHODS.split())
 
 
 class DeviceArray(NDArrayOperatorsMixin):
@@ -227,10 +101,10 @@ class DeviceArray(NDArrayOperatorsMixin):
     def __setitem__(self, key: Any, value: Any) -> None:
         opened = _open_key(key)
         new = _open(value)
-        if isinstance(opened, np.ndarray) and opened.dtype.kind in "iu" and np.ndim(new):
-            if len(np.unique(opened)) != opened.size:
-                msg = "an index is written to twice, which a device does in any order"
-                raise TypeError(msg)
+        listed = isinstance(opened, np.ndarray) and opened.dtype.kind in "iu"
+        if listed and np.ndim(new) and len(np.unique(opened)) != opened.size:
+            msg = "an index is written to twice, which a device does in any order"
+            raise TypeError(msg)
         self.values[opened] = new
 
     def _wrap(self, result: Any) -> DeviceArray:
@@ -250,41 +124,6 @@ def _method(name: str) -> Callable[..., Any]:
     return call
 
 
-METHODS = frozenset(
-    [
-        "all",
-        "any",
-        "argmax",
-        "argmin",
-        "argsort",
-        "astype",
-        "clip",
-        "copy",
-        "cumsum",
-        "diagonal",
-        "dot",
-        "fill",
-        "max",
-        "mean",
-        "min",
-        "nonzero",
-        "prod",
-        "ravel",
-        "repeat",
-        "reshape",
-        "round",
-        "sort",
-        "squeeze",
-        "std",
-        "sum",
-        "swapaxes",
-        "take",
-        "trace",
-        "transpose",
-        "var",
-        "view",
-    ]
-)
 for _name in METHODS:
     setattr(DeviceArray, _name, _method(_name))
 

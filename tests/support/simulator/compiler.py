@@ -55,9 +55,10 @@ def _build(text: str, macros: tuple[tuple[str, int], ...], sanitize: bool) -> Li
         raise RuntimeError(msg)
     plain = _call([compiler, "-E", "-x", "c++", *options(dict(macros)), "-"], text)
     found = kernels("\n".join(line for line in plain.splitlines() if not line.startswith("#")))
+    signature = "(void** arguments, int n_blocks, int order, unsigned seed)"
     launchers = "".join(
-        f'extern "C" const char* simulate_{name}(void** arguments, int n_blocks, int order, unsigned seed) {{\n'
-        f'    return simulator::run("{name}", simulator::call<{name}>, arguments, n_blocks, order, seed);\n}}\n'
+        f'extern "C" const char* simulate_{name}{signature} {{ return simulator::run('
+        f'"{name}", simulator::call<{name}>, arguments, n_blocks, order, seed); }}\n'
         for name in found
     )
     body = f'#include "{SHIM}"\nnamespace {{\n{plain}\n}}\n{launchers}'

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ class FaultError(Exception):
 class Guarded:
     """Memory of one array, aligned as the device's is, between two guards."""
 
-    live: weakref.WeakSet[Guarded] = weakref.WeakSet()
+    live: ClassVar[weakref.WeakSet[Guarded]] = weakref.WeakSet()
 
     def __init__(self, n_bytes: int) -> None:
         words = -(-n_bytes // 32) * 8

@@ -1,13 +1,13 @@
 """CUDA sources of the package as text, and what their kernels take.
 
 A source is named by its file, ``"cycle.cu"``, when it lies in this folder, and by package and file,
-``"spem.codes.cuda/vlad.cu"``, when it lies in another. ``#include "file.cuh"`` is done here, by text, from the
-package of the source or from this one, so that a source compiles wherever the package is, even in an archive.
+``"spem.codes.cuda/vlad.cu"``, when it lies in another. ``#include "file.cuh"`` is done here, by text, from
+the package of the source or from this one, so that a source compiles wherever the package is.
 
-Kernels are written out, not made by macros, as ``extern "C" __global__ void name(...)``. Their parameters are
-scalars (``int``, ``long long``, ``float``, ``double``), pointers to numbers (also ``float4`` and its like), or
-pointers to pointers, for which an int64 array of addresses stands. A type may be an alias, ``using Real =
-double;``, even one that macros choose.
+Kernels are written out, not made by macros, as ``extern "C" __global__ void name(...)``. Their parameters
+are scalars (``int``, ``long long``, ``float``, ``double``), pointers to numbers (also ``float4`` and its
+like), or pointers to pointers, for which an int64 array of addresses stands. A type may be an alias, ``using
+Real = double;``, even one that macros choose.
 """
 
 from __future__ import annotations
@@ -183,7 +183,7 @@ def _number(kernel: str, kind: str, pointer: bool) -> str:
 
 
 def _told(argument: Any) -> str:
-    """What an argument is, in a few words."""
+    """Tell what an argument is, in a few words."""
     kind = type(argument)
     if not hasattr(argument, "dtype"):
         return kind.__name__

@@ -1,11 +1,13 @@
 """What the Python around the kernels needs of a device.
 
 Kernels are launched through a `Runtime`, and arrays on its device made, moved and worked on through it, so
-that the same code runs on a GPU by CuPy and in a simulator over NumPy. ``runtime.program("cycle.cu", ORDER=2)``
-compiles a source of this folder, ``runtime.program("spem.codes.cuda/vlad.cu")`` one of another package
-(`spem.fields.solvers.cuda.programs`); ``.launch("name", n_blocks, *arguments)`` runs a kernel of it.
+that the same code runs on a GPU by CuPy and in a simulator over NumPy.
 
-Host and device arrays are never mixed: `Runtime.upload` and `Runtime.download` are the only ways between them.
+``runtime.program("cycle.cu", ORDER=2)`` compiles a source of this folder,
+``runtime.program("spem.codes.cuda/vlad.cu")`` one of another package (`spem.fields.solvers.cuda.programs`);
+``.launch("name", n_blocks, *arguments)`` runs a kernel of it.
+
+Host and device arrays are never mixed: `Runtime.upload` and `Runtime.download` are the ways between them.
 """
 
 from __future__ import annotations

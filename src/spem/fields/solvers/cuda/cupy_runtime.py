@@ -1,0 +1,196 @@
+"""The runtime of a GPU, by CuPy."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from spem.errors import MissingExtraError, ParameterError
+from spem.fields.solvers.cuda.programs import Kernel, kernels, options, read_source
+from spem.fields.solvers.cuda.runtime import THREADS, Array
+
+# cudaErrorMemoryAllocation and CUDA_ERROR_OUT_OF_MEMORY
+_OUT_OF_MEMORY = 2
+
+
+def load_cupy(index: int) -> Any:
+    """Import CuPy and make sure that it can use a device.
+
+    Raises
+    ------
+    MissingExtraError
+        When CuPy is not installed, or made for a later CUDA than the driver's.
+    ParameterError
+        When there is no driver, no device, or none of this number.
+    """
+    try:
+        cupy = import_module("cupy")
+    except ImportError as error:
+        missing = isinstance(error, ModuleNotFoundError) and error.name == "cupy"
+        state = "not installed" if missing else f"installed but cannot be imported ({error})"
+        msg = f"CuPy is {state}; it comes with pip install 'spem[cuda]'"
+        raise MissingExtraError(msg) from error
+    require_device(cupy.cuda.runtime, index)
+    return cupy
+
+
+def require_device(driver: Any, index: int) -> None:
+    """Raise a one-line error, as `load_cupy` does, unless ``cupy.cuda.runtime`` can use a device."""
+    version, wanted = driver.driverGetVersion(), driver.runtimeGetVersion()
+    if version == 0:
+        msg = "no NVIDIA driver is installed here; install one, or leave the device to the CPU"
+        raise ParameterError(msg)
+    if version // 1000 < wanted // 1000:
+        msg = (
+            f"CuPy is for CUDA {wanted // 1000}, the driver for CUDA {version // 1000}.{version % 1000 // 10}: "
+            "update the driver, or "
+            f"pip uninstall cupy-cuda{wanted // 1000}x and pip install 'spem[cuda{version // 1000}]'"
+        )
+        raise MissingExtraError(msg)
+    try:
+        count = driver.getDeviceCount()
+    except driver.CUDARuntimeError as error:
+        msg = f"no CUDA device can be used: {error}; leave the device to the CPU"
+        raise ParameterError(msg) from error
+    if not 0 <= index < count:
+        names = [driver.getDeviceProperties(number)["name"].decode() for number in range(count)]
+        listing = ", ".join(f"{number} {name}" for number, name in enumerate(names)) or "none"
+        msg = f"no CUDA device {index}; there are: {listing}"
+        raise ParameterError(msg)
+
+
+class CupyProgram:
+    """A source compiled by CuPy, for whichever device is current.
+
+    Parameters
+    ----------
+    cupy
+        The module.
+    source
+        Name of the source.
+    settings
+        The compiler's options for macros.
+    """
+
+    def __init__(self, cupy: Any, source: str, settings: tuple[str, ...]) -> None:
+        text = read_source(source)
+        self._cupy, self._source = cupy, source
+        self._kernels = kernels(text)
+        self._module = cupy.RawModule(code=text, options=("-std=c++17", *settings), backend="nvrtc")
+        self._functions: dict[str, tuple[Kernel, Any]] = {}
+
+    def launch(self, kernel: str, n_blocks: int, *arguments: Any) -> None:
+        """Run a kernel, see `spem.fields.solvers.cuda.runtime.Program`."""
+        if kernel not in self._functions:
+            if kernel not in self._kernels:
+                msg = f"{self._source} has no kernel {kernel}; it has {', '.join(self._kernels)}"
+                raise TypeError(msg)
+            self._functions[kernel] = (self._kernels[kernel], self._module.get_function(kernel))
+        known, function = self._functions[kernel]
+        known.check(arguments)
+        if n_blocks == 0:
+            return
+        try:
+            function((n_blocks,), (THREADS,), arguments)
+        except self._cupy.cuda.driver.CUDADriverError as error:
+            if error.status != _OUT_OF_MEMORY:
+                raise
+            msg = f"no memory left to launch {kernel}"
+            raise MemoryError(msg) from error
+
+
+class CupyRuntime:
+    """A CUDA device; it becomes the current device of CuPy in the thread that uses it.
+
+    Parameters
+    ----------
+    index
+        Number of the device.
+
+    Raises
+    ------
+    MissingExtraError, ParameterError
+        When it cannot be used: see `load_cupy`.
+    """
+
+    # CuPy's own error of its pool is one.
+    memory_errors: tuple[type[BaseException], ...] = (MemoryError,)
+
+    def __init__(self, index: int = 0) -> None:
+        self._cupy = load_cupy(index)
+        self._device = self._cupy.cuda.Device(index)
+        self._name = self._cupy.cuda.runtime.getDeviceProperties(index)["name"].decode()
+
+    @property
+    def xp(self) -> Any:
+        """CuPy."""
+        self._device.use()
+        return self._cupy
+
+    @property
+    def name(self) -> str:
+        """Name of the device."""
+        return str(self._name)
+
+    def program(self, source: str, **macros: int) -> CupyProgram:
+        """Compile a source, or find it compiled."""
+        self._device.use()
+        return _program(source, options(macros))
+
+    def upload(self, values: NDArray[Any]) -> Array:
+        """Copy to the device, by way of page-locked memory that CuPy keeps for it."""
+        return self.xp.asarray(np.ascontiguousarray(values))
+
+    def download(self, array: Array) -> NDArray[Any]:
+        """Copy to the host."""
+        self._device.use()
+        return np.asarray(array.get())
+
+    def zeros(self, shape: int | tuple[int, ...], dtype: DTypeLike) -> Array:
+        """Make an array of zeros."""
+        return self.xp.zeros(shape, dtype)
+
+    def empty(self, shape: int | tuple[int, ...], dtype: DTypeLike) -> Array:
+        """Make an array that holds anything."""
+        return self.xp.empty(shape, dtype)
+
+    def address(self, array: Array) -> int:
+        """Return where an array starts."""
+        return int(array.data.ptr)
+
+    def free_bytes(self) -> int:
+        """Return the bytes free on the device and in CuPy's pool, within the pool's limit."""
+        pool = self.xp.get_default_memory_pool()
+        free = int(self._device.mem_info[0]) + int(pool.free_bytes())
+        limit = int(pool.get_limit())
+        return min(free, limit - int(pool.used_bytes())) if limit else free
+
+    def release(self) -> None:
+        """Give back what CuPy's pools hold and nobody uses."""
+        self.xp.get_default_memory_pool().free_all_blocks()
+        self._cupy.get_default_pinned_memory_pool().free_all_blocks()
+
+    def synchronize(self) -> None:
+        """Wait for all work."""
+        self._device.synchronize()
+
+    def mark(self) -> Any:
+        """Return an event at the end of the work so far."""
+        event = self.xp.cuda.Event()
+        event.record()
+        return event
+
+    def elapsed(self, start: Any, end: Any) -> float:
+        """Return the seconds between two events."""
+        end.synchronize()
+        return float(self._cupy.cuda.get_elapsed_time(start, end)) / 1e3
+
+
+@cache
+def _program(source: str, settings: tuple[str, ...]) -> CupyProgram:
+    """Compile a source once."""
+    return CupyProgram(import_module("cupy"), source, settings)
