@@ -79,14 +79,24 @@ def _domain(shape: Shape, *, use_cuts: bool, default: float) -> Domain:
     steps = np.array([sign * stride for stride in strides for sign in (-1, 1)])  # by direction
     cuts = shape.cuts
     keep = slice(None) if use_cuts else slice(0)
-    neighbours, fraction = _connect(
-        shape.voxels, number, steps, cuts.voxel[keep], cuts.direction[keep], cuts.fraction[keep], default
+    # NumPy asks for large pages, compiled code does not: new pages cost more than what is written to them.
+    neighbours = np.empty((n, steps.size), np.int32)
+    fraction = _connect(
+        neighbours,
+        shape.voxels,
+        number,
+        steps,
+        cuts.voxel[keep],
+        cuts.direction[keep],
+        cuts.fraction[keep],
+        default,
     )
     return Domain(neighbours, fraction)
 
 
 @njit(cache=True, nogil=True)
 def _connect(
+    neighbours: NDArray[np.int32],
     voxels: NDArray[np.int64],
     number: NDArray[np.int32],
     steps: NDArray[np.int64],
@@ -94,10 +104,9 @@ def _connect(
     cut_direction: NDArray[np.uint8],
     cut_fraction: NDArray[np.float64],
     default: float,
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Neighbour table and boundary fractions; nodes and cuts are both in ascending order of voxel."""
-    n, width = voxels.size, steps.size
-    neighbours = np.empty((n, width), np.int32)
+) -> NDArray[np.float64]:
+    """Fill the neighbour table, return the boundary fractions; nodes and cuts are in order of voxel."""
+    n, width = neighbours.shape
     fraction = np.empty(cut_voxel.size + 16, np.float64)
     n_edges = 0
     cut = 0
@@ -126,4 +135,4 @@ def _connect(
                     fraction = grown
                 fraction[n_edges] = theta
                 n_edges += 1
-    return neighbours, fraction[:n_edges].copy()
+    return fraction[:n_edges].copy()

@@ -109,17 +109,20 @@ def assemble(shape: Shape, boundary: Boundary = "surface") -> System:
         raise ParameterError(msg)
     domain = _DOMAINS[boundary](shape)
     weights = 1.0 / np.square(shape.spacing)
-    rhs, diagonal, mass = _eliminate(domain.neighbours, domain.fraction, weights)
+    rhs, diagonal, mass = sums = np.empty((3, domain.n_nodes))
+    _eliminate(domain.neighbours, domain.fraction, weights, sums)
     return System(shape, domain, weights, rhs, diagonal, mass, boundary)
 
 
 @njit(cache=True, nogil=True)
 def _eliminate(
-    neighbours: NDArray[np.int32], fraction: NDArray[np.float64], weights: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Right-hand side b, diagonal of A and diagonal of M, from the boundary edges of each node."""
+    neighbours: NDArray[np.int32],
+    fraction: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    sums: NDArray[np.float64],
+) -> None:
+    """Write b, the diagonal of A and that of M, from the boundary edges of each node."""
     n, width = neighbours.shape
-    rhs, diagonal, mass = np.empty(n), np.empty(n), np.empty(n)
     whole = 2 * weights.sum()
     edge = 0
     for i in range(n):
@@ -135,7 +138,6 @@ def _eliminate(
                     source += weights[k // 2] / theta
                     cut += weights[k // 2]
                     missing += 1 - theta
-        rhs[i] = source
-        diagonal[i] = whole - cut + source
-        mass[i] = 1 - missing / width
-    return rhs, diagonal, mass
+        sums[0, i] = source
+        sums[1, i] = whole - cut + source
+        sums[2, i] = 1 - missing / width
