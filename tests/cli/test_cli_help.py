@@ -19,7 +19,19 @@ from spem.codes.settings import Components, Settings
 from spem.fields.operator import Boundary
 from spem.fields.rho import Scheme
 
-COMMANDS = ("info", "field", "maps", "parts", "encode", "search", "evaluate", "demo", "paper", "serve")
+COMMANDS = (
+    "info",
+    "field",
+    "maps",
+    "parts",
+    "encode",
+    "search",
+    "evaluate",
+    "demo",
+    "paper",
+    "serve",
+    "devices",
+)
 HEAVY = (
     "numba",
     "scipy",
@@ -36,6 +48,7 @@ HEAVY = (
     "pandas",
     "fastapi",
     "distributed",
+    "cupy",
 )
 
 

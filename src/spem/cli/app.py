@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 from spem import __version__
 from spem.cli.demo import demo
+from spem.cli.devices import devices
 from spem.cli.encode import encode
 from spem.cli.evaluate import evaluate
 from spem.cli.fields import field
@@ -175,7 +176,7 @@ def _refuse(message: str) -> None:
     raise typer.Exit(NOTHING) from None
 
 
-for _command in (info, field, maps, parts, encode, search, evaluate, demo, paper, serve):
+for _command in (info, field, maps, parts, encode, search, evaluate, demo, paper, serve, devices):
     app.command()(guarded(_command))
 _of_group: dict[str, Any] = {"add": add, **COMMANDS, **INDEX_SEARCH}
 for _name, _of_index in _of_group.items():

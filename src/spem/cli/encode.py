@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from spem.cli.options import Device, Jobs, Json, check_device
+from spem.cli.options import Device, Jobs, Json, find_device
 from spem.cli.output import check_target, complain, counted, print_json
 from spem.cli.progress import Bar
 from spem.cli.settings_options import with_settings
@@ -68,7 +68,7 @@ def encode(
     """  # noqa: D301
     from spem.codes.settings import Settings
 
-    check_device(device)
+    find_device(device)
     if not paper:
         Settings.of(options)
     for target in (output, save_vocabulary):

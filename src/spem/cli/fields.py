@@ -25,7 +25,7 @@ from spem.cli.options import (
     Spacing,
     Threshold,
     Voxels,
-    check_device,
+    find_device,
     read_shape,
     tell_repairs,
 )
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from spem.fields.solvers.engine import Backend
     from spem.shapes.shape import Shape
 
 Rho = Annotated[
@@ -107,10 +108,16 @@ def field(
       spem field hand.png --source 12,40 -o tip.npz --plot tip.png
       spem field cat.off --patch 0.1,-20,31.5 --patches 100 --rho 5,inf -o ear.npz
     """  # noqa: D301
-    check_device(device)
+    where = find_device(device)
     check_targets(shape, output, plot)
     screening = _screening(rho, single=bool(source or patch))
     _check_sources(source, patch, patches)
+    if where is not None and (source or patch):
+        msg = (
+            f"--device {device}: single sources are solved on the processor, by elimination, "
+            "since their logarithms need every digit; leave it out"
+        )
+        raise ParameterError(msg)
     grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius, "grid_spacing": grid_spacing}
     inside = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
     found = read_shape(shape, **grid, **inside, components=components)  # type: ignore[arg-type]
@@ -122,13 +129,14 @@ def field(
         request = SourceRequest(tuple(source or patch or ()), bool(patch), patches or PATCHES, boundary.value)
         write_sources(found, request, screening, output, plot, json=json)
     else:
-        _write(found, screening, boundary, output, plot, json=json)
+        _write(found, screening, boundary, where, output, plot, json=json)
 
 
 def _write(
     shape: Shape,
     rho: NDArray[np.float64],
     boundary: BoundaryChoice,
+    where: Backend | None,
     output: Path | None,
     plot: Path | None,
     *,
@@ -137,7 +145,7 @@ def _write(
     """Solve for the fields of the whole boundary, write and draw them."""
     from spem.api.fields import field as solve
 
-    values = solve(shape, rho, boundary=boundary.value)
+    values = solve(shape, rho, boundary=boundary.value, device=where)
     if output is not None:
         write_npz(output, points=shape.points, values=values, rho=rho, **about(shape, boundary.value))
     if plot is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spem.cli.index import Address, parse_metadata
-from spem.cli.options import Device, Jobs, Json, check_device
+from spem.cli.options import Device, Jobs, Json, find_device
 from spem.cli.output import complain, counted, print_json
 from spem.cli.progress import Bar
 from spem.cli.settings_options import with_settings
@@ -86,7 +86,7 @@ def add(
     from spem.codes.workers import count_processes
     from spem.index.index import Index
 
-    check_device(device)
+    find_device(device)
     settings = Settings.paper(**options) if paper else None
     Settings.of(options)
     metadata = {key: value or "" for key, value in parse_metadata(meta or []).items()}

@@ -25,7 +25,7 @@ from spem.cli.options import (
     Spacing,
     Threshold,
     Voxels,
-    check_device,
+    find_device,
     read_shape,
     tell_repairs,
 )
@@ -82,7 +82,7 @@ def maps(
       spem maps hand.png -o hand.npz --plot hand-maps.png
       spem maps cat.off --n-maps 4 --rho-min 1 --rho-max 30 --n-rho 128 --rho-scheme log -o cat.npz
     """  # noqa: D301
-    check_device(device)
+    where = find_device(device)
     check_targets(shape, output, plot)
     grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius, "grid_spacing": grid_spacing}
     inside = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
@@ -94,7 +94,7 @@ def maps(
 
     _check_bounds(found.size, rho_min, rho_max)
     rho = sample_rho(found.size, rho_min, rho_max, n_rho, rho_scheme.value)
-    result = project(found, n_maps, centred=centred, rho=rho, boundary=boundary.value)
+    result = project(found, n_maps, centred=centred, rho=rho, boundary=boundary.value, device=where)
     arrays = {"basis": result.basis, "variance": result.variance, "explained": result.explained, "rho": rho}
     if output is not None:
         write_npz(output, points=found.points, maps=result.values, **arrays, **about(found, boundary.value))

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from spem.cli.output import complain
-from spem.errors import ParameterError
+from spem.errors import ParameterError, SpemError
 
 if TYPE_CHECKING:
+    from spem.fields.solvers.engine import Backend
     from spem.shapes.shape import Shape
 
 # Patches of the boundary, where none are asked for.
@@ -85,7 +86,12 @@ Boundary = Annotated[
     BoundaryChoice,
     typer.Option(help="Where v = 1: on the surface, or on the voxels outside (paper)."),
 ]
-Device = Annotated[str, typer.Option(help="Where to compute; cpu is all there is.")]
+Device = Annotated[
+    str,
+    typer.Option(
+        metavar="DEVICE", help="Where sweeps over ρ run: cpu, cuda or cuda:NUMBER; spem devices lists them."
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 Plot = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a picture too (.png, .pdf or .svg).")]
 Jobs = Annotated[
@@ -94,21 +100,37 @@ Jobs = Annotated[
 ]
 
 
-def check_device(device: str) -> None:
-    """Refuse a device that there is no code for.
+def find_device(text: str) -> Backend | None:
+    """Return the device that was asked for, None for the processor; it is tried before anything is read.
+
+    Parameters
+    ----------
+    text
+        ``"cpu"``, ``"cuda"`` or ``"cuda:NUMBER"``.
 
     Raises
     ------
     ParameterError
-        For anything but ``"cpu"``.
+        For other words, and where there is no such device.
+    MissingExtraError
+        When CuPy is not installed, or does not fit the driver.
 
     Examples
     --------
-    >>> check_device("cpu")
+    >>> find_device("cpu")
     """
-    if device != "cpu":
-        msg = f"--device {device}: this version computes on the cpu only; use --device cpu or leave it out"
-        raise ParameterError(msg)
+    if text == "cpu":
+        return None
+    from spem.fields.solvers.cuda.device import Cuda, parse_device
+
+    device = parse_device(text)
+    if isinstance(device, Cuda):
+        try:
+            device.runtime()
+        except SpemError as error:
+            msg = f"--device {text}: {error}"
+            raise type(error)(msg) from error
+    return device
 
 
 def read_shape(
