@@ -27,3 +27,14 @@ def resident() -> int:
     if not status.is_file():
         return peak()
     return int(status.read_text(encoding="ascii").split()[1]) * resource.getpagesize()
+
+
+def available() -> int | None:
+    """Return the memory that can still be had, in bytes; None where the system does not tell."""
+    table = Path("/proc/meminfo")
+    if not table.is_file():
+        return None
+    for line in table.read_text(encoding="ascii").splitlines():
+        if line.startswith("MemAvailable:"):
+            return 1024 * int(line.split()[1])
+    return None

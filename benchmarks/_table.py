@@ -9,6 +9,7 @@ import os
 import platform
 import statistics
 import time
+import traceback
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,18 +26,40 @@ Row = dict[str, Any]
 class Benchmark:
     """One run of one script: its options, and the rows, notes and skipped parts that end in the JSON file."""
 
-    def __init__(self, name: str, description: str, argv: Sequence[str] | None = None) -> None:
+    def __init__(
+        self, name: str, description: str, argv: Sequence[str] | None = None, sections: Sequence[str] = ()
+    ) -> None:
         parser = argparse.ArgumentParser(description=description)
+        if sections:
+            parser.add_argument(
+                "--only", action="append", choices=sections, metavar="SECTION", help=", ".join(sections)
+            )
         parser.add_argument("--quick", action="store_true", help="small sizes, seconds in all")
         parser.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "results", help="folder")
         options = parser.parse_args(argv)
-        self.name = name
+        chosen = getattr(options, "only", None)
+        self.sections: tuple[str, ...] = tuple(chosen or sections)
+        # a part of the figures does not replace all of them
+        self.name = "_".join([name, *chosen]) if chosen else name
+        self.failed = False
         self.quick: bool = options.quick
         self.out: Path = options.out
         self.tables: dict[str, list[Row]] = {}
         self.targets: list[Row] = []
         self.skipped: list[str] = []
         self.facts: dict[str, Any] = {}
+
+    def section(self, name: str, run: Callable[[], None]) -> None:
+        """Run a section if it was asked for, and write what there is; its failure ends no other."""
+        if name not in self.sections:
+            return
+        try:
+            run()
+        except Exception as error:  # noqa: BLE001
+            traceback.print_exc()
+            self.failed = True
+            self.skip(f"{name}: FAILED with {type(error).__name__}: {' '.join(str(error).split())}")
+        self.write()
 
     def skip(self, reason: str) -> None:
         """Say that a part was not run, and why."""

@@ -17,6 +17,7 @@ WITHOUT_DATA = (
     "cluster",
     "convergence",
     "geodesics",
+    "gpu_sweep",
     "index_kill",
     "parts_silhouettes",
     "patches",
@@ -122,3 +123,35 @@ def test_speed_without_a_peer_says_so(tmp_path):
     assert any("pyamg" in reason for reason in result["skipped"])
     methods = {row["method"] for rows in result["tables"].values() for row in rows}
     assert not any("pyamg" in method for method in methods)
+
+
+def test_sections_are_run_apart(tmp_path):
+    """A section that is asked for alone writes a file of its own, and stands in it alone."""
+    command = [
+        sys.executable,
+        str(FOLDER / "gpu_sweep.py"),
+        "--quick",
+        "--only",
+        "host",
+        "--out",
+        str(tmp_path),
+    ]
+    subprocess.run(command, capture_output=True, text=True, check=True)
+    [path] = tmp_path.glob("*.json")
+    assert path.name == "gpu_sweep_host.json"
+    [title] = json.loads(path.read_text(encoding="utf-8"))["tables"]
+    assert title.startswith("small algebra")
+
+
+def test_a_section_that_fails_ends_no_other(tmp_path, monkeypatch):
+    """The failure of a section is told among what was skipped, and the rest is measured."""
+    monkeypatch.syspath_prepend(str(FOLDER))
+    from _table import Benchmark
+
+    benchmark = Benchmark("b", "", ["--quick", "--out", str(tmp_path)], ("bad", "good"))
+    benchmark.section("bad", lambda: {}["none"])
+    benchmark.section("good", lambda: benchmark.table("good", [{"a": 1}]))
+    assert benchmark.failed
+    kept = json.loads((tmp_path / "b.json").read_text(encoding="utf-8"))
+    assert kept["skipped"] == ["bad: FAILED with KeyError: 'none'"]
+    assert list(kept["tables"]) == ["good"]
