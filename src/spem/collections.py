@@ -15,6 +15,7 @@ from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.codes.sources import as_source, find_files, source_hash
 from spem.errors import LabelError, ParameterError, ReadError, require_kind
+from spem.fields.solvers.engine import Backend
 from spem.retrieval.classification import Classification, classify_vectors
 from spem.retrieval.distances import correlation_distance
 from spem.retrieval.evaluation import Scores
@@ -32,6 +33,7 @@ def encode(
     model: Model | None = None,
     n_jobs: int = 1,
     work: str | Path | None = None,
+    device: Backend | None = None,
     **options: Any,
 ) -> Codes:
     """Make the codes of a collection: fields, maps, a vocabulary, VLAD (5.5).
@@ -48,6 +50,8 @@ def encode(
         Number of processes.
     work
         Folder from which an interrupted call goes on; delete it when the codes are saved.
+    device
+        Where to sweep shapes, in batches, such as ``spem.Cuda()``; the processor when None.
     **options
         Settings by name, in place of `settings`.
 
@@ -80,10 +84,16 @@ def encode(
     listed: list[str | Path | Shape] = []
     for source in given:
         listed.extend([source] if isinstance(source, Shape) else find_files([source]))
-    return encode_collection(listed, chosen, model=model, n_jobs=n_jobs, work=work)
+    return encode_collection(listed, chosen, model=model, n_jobs=n_jobs, work=work, device=device)
 
 
-def search(codes: Codes | str | Path, query: str | Path | Shape, k: int | None = 10) -> list[Answer]:
+def search(
+    codes: Codes | str | Path,
+    query: str | Path | Shape,
+    k: int | None = 10,
+    *,
+    device: Backend | None = None,
+) -> list[Answer]:
     """Rank the shapes of a collection by their distance to a query.
 
     Parameters
@@ -95,6 +105,8 @@ def search(codes: Codes | str | Path, query: str | Path | Shape, k: int | None =
         or the name or path of a shape of the collection.
     k
         Number of answers; all with None.
+    device
+        Where to sweep the query; the processor when None.
 
     Returns
     -------
@@ -116,7 +128,7 @@ def search(codes: Codes | str | Path, query: str | Path | Shape, k: int | None =
     """
     collection = codes if isinstance(codes, Codes) else Codes.load(codes)
     row = _row(collection, query)
-    vector = encode_file(query, collection.model) if row is None else collection.vectors[row]
+    vector = encode_file(query, collection.model, device=device) if row is None else collection.vectors[row]
     return rank(vector, collection, k)
 
 

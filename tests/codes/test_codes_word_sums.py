@@ -20,7 +20,7 @@ from spem.errors import ParameterError
 from spem.fields.solvers.cuda.layout import Layout
 
 Counts = tuple[tuple[int, int], ...]
-# Red and black nodes. The first is large enough for two chunks, the second for one tile of each colour, the third for one node.
+# Red and black nodes: two chunks, a tile of each colour, one node.
 COUNTS: Counts = ((1500, 1200), (100, 90), (1, 0))
 
 

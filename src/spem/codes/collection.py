@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from spem.codes.codes import Codes, Failure
+from spem.codes.device_work import DeviceWork
+from spem.codes.drafts import draft_shapes, finish_drafts
 from spem.codes.kinds import shape_features
 from spem.codes.listing import Listing
 from spem.codes.model import Model
@@ -23,6 +25,7 @@ from spem.codes.sources import Source, as_source, read_shapes, source_name, sour
 from spem.codes.work import Entry, Work, dimension
 from spem.codes.workers import one_line, run_all
 from spem.errors import ModelError, ParameterError, ReadError, ShapeError, SpemError
+from spem.fields.solvers.engine import Backend
 from spem.shapes.kinds import SUFFIXES, has_suffix
 from spem.shapes.shape import Shape
 
@@ -42,6 +45,7 @@ def encode_collection(
     work: str | Path | None = None,
     progress: Progress | None = None,
     on_failure: Callable[[Failure], None] | None = None,
+    device: Backend | None = None,
 ) -> Codes:
     """Make the codes of a collection.
 
@@ -69,6 +73,10 @@ def encode_collection(
         Called with a stage (``"fields"``, ``"codes"``), the number of sources done and of all.
     on_failure
         Called for each failure when it happens.
+    device
+        Where to sweep shapes and make SPEM maps, in batches, such as ``spem.Cuda()``; when None each process
+        does so for itself. Codes agree but for rounding, and the work folder is the same: a call goes on with
+        or without a device from where another was interrupted.
 
     Returns
     -------
@@ -106,13 +114,15 @@ def encode_collection(
         wanted = {key: source for key, source in listing.first.items() if key not in reused}
         # One process may take all cores for a large shape; of several each has one.
         task = _Task(folder, chosen, model, threads=None if n_jobs == 1 else 1)
-        ndim_of = _compute(wanted, task, n_jobs, listing, progress or (lambda *_: None))
+        ndim_of = _compute(wanted, task, n_jobs, listing, progress or (lambda *_: None), device)
         whole = {key: ndim_of[key] for key in wanted if key not in listing.broken}
         fitted = model or _fit(folder, whole, chosen, listing)
         return _assemble(listing, folder, reused, fitted, progress or (lambda *_: None))
 
 
-def encode_file(source: str | Path | Shape, model: Model) -> NDArray[np.float32]:
+def encode_file(
+    source: str | Path | Shape, model: Model, *, device: Backend | None = None
+) -> NDArray[np.float32]:
     """Make the code of one file or shape with a model.
 
     Parameters
@@ -121,6 +131,8 @@ def encode_file(source: str | Path | Shape, model: Model) -> NDArray[np.float32]
         A file that holds one shape, or a shape.
     model
         The model of the codes that it is to be compared with.
+    device
+        Where to sweep it; the processor when None.
 
     Returns
     -------
@@ -143,7 +155,12 @@ def encode_file(source: str | Path | Shape, model: Model) -> NDArray[np.float32]
     (64,)
     """
     with threadpool_limits(1):
-        entries = _entries(as_source(source), model.settings, model)
+        given = as_source(source)
+        entries = (
+            _entries(given, model.settings, model)
+            if device is None
+            else finish_drafts(draft_shapes(given, model.settings, model), model.settings, model, device)
+        )
     if len(entries) != 1:
         msg = f"{source}: holds {len(entries)} labels; encode the file and query by one of its shapes"
         raise ShapeError(msg)
@@ -248,20 +265,32 @@ def _entries(
 
 
 def _compute(
-    wanted: dict[str, Source], task: _Task, n_jobs: int, listing: Listing, progress: Progress
+    wanted: dict[str, Source],
+    task: _Task,
+    n_jobs: int,
+    listing: Listing,
+    progress: Progress,
+    device: Backend | None,
 ) -> dict[str, int]:
     """Bring the work folder up to date and return the dimension of each source; those that fail are noted."""
     found = {key: task.folder.dimension(key) for key in wanted}
     ndim_of = {key: ndim for key, ndim in found.items() if ndim is not None}
     todo = [(key, source) for key, source in wanted.items() if key not in ndim_of]
-    done = len(wanted) - len(todo)
-    progress("fields", done, len(wanted))
+    progress("fields", len(ndim_of), len(wanted))
+
+    def done(key: str, ndim: int) -> None:
+        ndim_of[key] = ndim
+        progress("fields", len(ndim_of), len(wanted))
+
+    if device is not None:
+        DeviceWork(task.folder, task.settings, task.model, device, task.threads).run(
+            todo, n_jobs, listing, done
+        )
+        return ndim_of
     for (key, source), ndim, reason in run_all(task, todo, n_jobs):
-        done += 1
         if reason:
             listing.fail(source, reason, key)
-        ndim_of[key] = ndim or 0
-        progress("fields", done, len(wanted))
+        done(key, ndim or 0)
     return ndim_of
 
 

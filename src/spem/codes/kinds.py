@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
 
 from spem.codes.bands import Bands
@@ -51,12 +51,33 @@ def shape_features(shape: Shape, settings: Settings, threads: int | None = None)
     >>> [shape_features(shape, Settings(features=kind))[0].shape[1] for kind in ("spem", "hks")]
     [8, 8]
     """
+    return tuple(band for bands in kind_features(shape, settings, threads) for band in bands or ())
+
+
+def kind_features(
+    shape: Shape, settings: Settings, threads: int | None = None, *, later: Collection[str] = ()
+) -> tuple[Bands | None, ...]:
+    """Compute the node features of each kind apart, as `shape_features` takes its arguments.
+
+    Parameters
+    ----------
+    later
+        Kinds that are made elsewhere, for which None is returned.
+
+    Examples
+    --------
+    >>> from spem.shapes.synthetic import disk
+    >>> kind_features(disk(radius=10.0, spacing=1.0), Settings(features="spem"), later=["spem"])
+    (None,)
+    """
     try:
         parts = settings.parts(shape.ndim)
     except ParameterError as error:
         msg = f"{shape.name}: {error}"
         raise ParameterError(msg) from error
-    return tuple(band for part in parts for band in KINDS[part.features](shape, part, threads))
+    return tuple(
+        None if part.features in later else KINDS[part.features](shape, part, threads) for part in parts
+    )
 
 
 def _maps(shape: Shape, settings: Settings, threads: int | None) -> Bands:
