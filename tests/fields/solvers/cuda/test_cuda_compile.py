@@ -1,4 +1,4 @@
-"""Every CUDA source compiles as CuPy compiles it, for several generations, within a multiprocessor's means."""
+"""Every CUDA source compiles as CuPy compiles it, for several generations, within a device's means."""
 
 from __future__ import annotations
 
@@ -79,9 +79,6 @@ def test_sources_compile_for_other_devices(source: str, architecture: int) -> No
 @compiles
 def test_what_is_refused_is_told() -> None:
     """The compiler's words, with the line of the file that is included, are in the error."""
-    text = (
-        read_source("common.cuh")
-        + '#line 7 "wrong.cu"\nextern "C" __global__ void wrong(float* v) { v = 1; }'
-    )
+    wrong = '#line 7 "wrong.cu"\nextern "C" __global__ void wrong(float* v) { v = 1; }'
     with pytest.raises(nvrtc.CompilationError, match=r"wrong\.cu\(7\): error"):
         nvrtc.compile_kernels(read_source("common.cuh") + wrong, (), 90)
