@@ -295,7 +295,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 4)
     const Range *own = (const Range *)ranges + system;
     const Table *tables = (const Table *)levels;
     for (int level = top; level < bottom; ++level) {
-        const Table table = tables[level];
+        const Table &table = tables[level];
         const Graph graph = graph_of(table, level, system);
         const Range fine = own[level * n_systems], coarse = own[(level + 1) * n_systems];
         float *values = level == 0 ? z : table.z;
@@ -310,7 +310,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 4)
     solve_coarsest(own[bottom * n_systems], system, inverse, last, bottom == 0 ? z : tables[bottom].z);
     __syncthreads();
     for (int level = bottom - 1; level >= top; --level) {
-        const Table table = tables[level];
+        const Table &table = tables[level];
         const Graph graph = graph_of(table, level, system);
         const Range range = own[level * n_systems];
         const float *residual = level == 0 ? r : table.r;

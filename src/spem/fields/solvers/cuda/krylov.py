@@ -40,7 +40,7 @@ class Krylov:
     """Conjugate gradients for (A + s M) x = r on all active systems.
 
     Answers are ``(n_systems, LANES)``, zero for systems that are not active, and those for a system do not
-    depend on what else is in the batch. The last step of x is taken by `finish` or the next `search`.
+    depend on what else is in the batch. x is a step late: `finish` before it is read, or p overwritten.
 
     Parameters
     ----------
@@ -66,6 +66,7 @@ class Krylov:
 
     def prepare(self, shifts: Small, active: Flags) -> None:
         """Take the shifts ``(n_systems, LANES)`` and the active systems ``(n_systems,)`` of a round."""
+        self.finish()
         self._choose(active)
         self.cycle.prepare(shifts, active)
 
