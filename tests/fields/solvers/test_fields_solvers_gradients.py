@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from backends import DEVICES, use_backend
+from simulator import Simulated
 
 import spem
 from spem.errors import ConvergenceError, ParameterError, SizeError
@@ -114,6 +116,45 @@ def test_memory_that_runs_out_later_halves_the_batch_too(sources, rhs):
     found = MultigridGradients(device=device).prepare(sources.system, 0.1).solve(rhs)
     assert np.array_equal(found, MultigridGradients().prepare(sources.system, 0.1).solve(rhs))
     assert (device.asked, device.closed) == ([6, 3, 1], 3)
+
+
+@pytest.mark.parametrize("name", DEVICES)
+def test_kernels_agree_with_the_direct_solver(sources, rhs, name):
+    """On devices, too: right in double precision, and the same bits in any group, lane and company."""
+    solver = MultigridGradients(rtol=1e-11, device=use_backend(name))
+    for shift in (0.0, 0.1):
+        part = solver.prepare(sources.system, shift)
+        found, direct = part.solve(rhs[:, :20]), Direct().prepare(sources.system, shift).solve(rhs[:, :20])
+        assert np.all(np.abs(found - direct).max(axis=0) <= 1e-9 * direct.max(axis=0))
+        assert np.array_equal(part.solve(rhs[:, 5:12]), found[:, 5:12])
+
+
+@pytest.mark.parametrize("name", DEVICES)
+def test_kernels_take_a_shift_a_lane(name):
+    """On devices, too, several ρ of the whole boundary share lanes."""
+    system, rho = assemble(hook()), np.array([0.3, 2.0, 50.0, np.inf])
+    solution = MultigridGradients(rtol=1e-10, device=use_backend(name)).solve(system, rho)
+    assert solution.converged
+    assert np.abs(solution.values - Direct().solve(system, rho).values).max() < 1e-8
+
+
+def test_the_memory_of_the_simulator_sets_the_batch(sources, rhs):
+    """A device that opens three groups and cannot load them takes fewer at a time, to the same bits."""
+    system, memory = sources.system, 1 << 19
+    while not _fits(system, 3, memory):
+        memory = memory * 9 // 8
+    found = MultigridGradients(device=Simulated(memory=memory)).prepare(system, 0.1).solve(rhs)
+    assert np.array_equal(found, MultigridGradients(device=Simulated()).prepare(system, 0.1).solve(rhs))
+    with pytest.raises(SizeError, match="1 shape of 798 nodes take"):
+        MultigridGradients(device=Simulated(memory=memory // 8)).prepare(system, 0.1).solve(rhs)
+
+
+def _fits(system, copies, memory):
+    try:
+        Simulated(memory=memory).open([system] * copies, np.float32).close()
+    except SizeError:
+        return False
+    return True
 
 
 def test_a_device_without_room_for_one_group_is_an_error(sources, rhs):

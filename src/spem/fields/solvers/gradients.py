@@ -171,7 +171,8 @@ def _solve(
     """Solve (A + shift M) v = rhs, a shift a column, in batches of groups of `LANES`."""
     backend: Backend = Host(solver.threads) if solver.device is None else solver.device
     count = rhs.shape[1]
-    found = Refined(np.zeros(rhs.shape), np.zeros(count), np.zeros(count, np.int64))
+    # Column by column, as they are found and as fields of sources are kept.
+    found = Refined(np.zeros(rhs.shape, order="F"), np.zeros(count), np.zeros(count, np.int64))
     most = 1 if solver.device is None else max(_BATCH_NODES // system.n_nodes, 1)
     copies, start, engine = min(most, -(-count // LANES)), 0, None
     try:
