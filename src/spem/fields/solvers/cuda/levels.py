@@ -153,7 +153,7 @@ class _Batch:
             raise ParameterError(msg)
         units = np.array([min(system.shape.spacing) for system in systems])
         first = np.cumsum([0, *(system.n_nodes for system in systems)], dtype=np.int64)
-        program = runtime.program("levels.cu", DIM=dimensions[0])
+        program = runtime.program("levels.cu", DIM=dimensions[0], SIDE=_brick_side(dimensions[0]))
         return cls(systems, runtime, program, units, first)
 
     @property
@@ -176,24 +176,19 @@ class _Batch:
 
     def _number(self, first: Any) -> tuple[Layout, Any, _Stage]:
         """Lay out the finest level: rows of nodes, and voxels of rows."""
-        runtime, n, n_systems = self.runtime, self.n_nodes, np.int32(len(self.systems))
+        runtime, n = self.runtime, np.int64(self.n_nodes)
         grid = np.array([system.shape.mask.shape for system in self.systems], np.int32)
+        first_cell = _first_cells(grid, np.ones(len(grid), np.bool_))
         voxels = runtime.upload(_joined([system.shape.voxels for system in self.systems]))
-        black = runtime.empty((n,), np.int8)
-        sides = runtime.upload(grid)
-        self._launch("colour_nodes", n, voxels, first, sides, n_systems, np.int64(n), black)
-        n_black = runtime.xp.cumsum(black, dtype=np.int32)
-        before = _sums_before(n_black, self.first_node, runtime)
-        blacks = np.diff(before)
-        layout = Layout.of(np.stack([np.diff(self.first_node) - blacks, blacks], axis=1), runtime)
-        # of the nodes or black nodes of all systems, the first one of this has the first row
-        skipped = np.stack([self.first_node[:-1] - before[:-1], before[:-1] + 1], axis=1)
-        base = runtime.upload(layout.first_row - skipped)
-        rows = runtime.empty((n,), np.int32)
+        where = voxels, first, runtime.upload(grid), runtime.upload(first_cell)
+        sizes = np.int32(len(grid)), n
+        marks = runtime.zeros((int(first_cell[-1]),), np.int8)
+        self._launch("mark_nodes", int(n), *where, *sizes, marks)
+        layout, n_marked, base = _lay_out(marks, first_cell, runtime)
+        del marks
+        rows = runtime.empty((int(n),), np.int32)
         position = _filled(runtime, (layout.n_rows,), np.int64, -1)
-        self._launch(
-            "number_nodes", n, voxels, black, n_black, first, base, n_systems, np.int64(n), rows, position
-        )
+        self._launch("number_nodes", int(n), *where, n_marked, base, *sizes, rows, position)
         return layout, rows, _Stage(grid, position)
 
     def _neighbours(self, layout: Layout, rows: Any, first: Any) -> Any:
@@ -251,11 +246,8 @@ class _Batch:
         where = stage.position, fine.tile_system, runtime.upload(stage.grid), runtime.upload(first_cell)
         marks = runtime.zeros((int(first_cell[-1]),), np.int8)
         self._launch("mark_blocks", n, *where, np.int64(n), marks)
-        n_marked = runtime.xp.cumsum(marks, dtype=np.int32)
-        before = _sums_before(n_marked, first_cell, runtime)
+        layout, n_marked, base = _lay_out(marks, first_cell, runtime)
         del marks
-        layout = Layout.of(np.diff(before).reshape(-1, 2), runtime)
-        base = runtime.upload(layout.first_row - before[:-1].reshape(-1, 2) - 1)
         parent = runtime.empty((n,), np.int32)
         children = _filled(runtime, (layout.n_rows, 2 ** stage.grid.shape[1]), np.int32, n)
         position = _filled(runtime, (layout.n_rows,), np.int64, -1)
@@ -296,7 +288,9 @@ def hierarchy_bytes(systems: Sequence[System]) -> Footprint:
     n, rows = int(nodes.sum()), int((nodes + 2 * (TILE - 1)).sum())
     # rows of nodes, the table, and the diagonals in both precisions
     held = 4 * n + rows * (8 * d + 24)
-    peak = max(29 * n + 8 * rows, (4 + 8 * d) * n + (8 + 8 * d) * rows, 8 * n + 8 * rows + held)
+    cells = int(_first_cells(grid, np.ones(len(grid), np.bool_))[-1])
+    numbered = 8 * n + max(_CELL_BYTES * cells, 4 * cells + 4 * n + 8 * rows)
+    peak = max(numbered, (4 + 8 * d) * n + (8 + 8 * d) * rows, 8 * n + 8 * rows + held)
     level, large = 0, nodes > COARSEST
     while large.any():
         level, grid = level + 1, (grid + 1) // 2
@@ -311,12 +305,27 @@ def hierarchy_bytes(systems: Sequence[System]) -> Footprint:
     return Footprint(peak, held)
 
 
+def _brick_side(d: int) -> int:
+    """Voxels along the side of a brick, whose rows are one tile, or two."""
+    return int({1: 2 * TILE, 2: 16, 3: 8, 4: 4}.get(d, 2))
+
+
 def _first_cells(grid: NDArray[Any], large: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """First cell of the red and of the black blocks of each system, and their number; none but of `large`."""
-    half = grid.astype(np.int64)
-    half[:, -1] = (half[:, -1] + 1) // 2
-    cells = np.where(large, np.prod(half, axis=1), 0)
+    """First red and first black cell of each system, in whole bricks, and their number; only of `large`."""
+    d = grid.shape[1]
+    side = _brick_side(d)
+    bricks = np.prod(-(-grid.astype(np.int64) // side), axis=1)
+    cells = np.where(large, bricks * side**d // 2, 0)
     return np.cumsum(np.concatenate([[0], np.repeat(cells, 2)]), dtype=np.int64)
+
+
+def _lay_out(marks: Any, first_cell: NDArray[np.int64], runtime: Runtime) -> tuple[Layout, Any, Any]:
+    """Lay out marked cells; the row of one is their number up to it and a base, (n_systems, 2), together."""
+    n_marked = runtime.xp.cumsum(marks, dtype=np.int32)
+    before = _sums_before(n_marked, first_cell, runtime)
+    layout = Layout.of(np.diff(before).reshape(-1, 2), runtime)
+    base = layout.first_row - before[:-1].reshape(-1, 2) - 1
+    return layout, n_marked, runtime.upload(base)
 
 
 def _sums_before(sums: Any, first: NDArray[np.int64], runtime: Runtime) -> NDArray[np.int64]:
