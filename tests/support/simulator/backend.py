@@ -23,13 +23,16 @@ class Simulated:
         In which threads run between barriers, and blocks of a grid.
     memory
         Bytes of the device.
+    sanitize
+        Run under the compiler's sanitizers; see `SimulatedRuntime`.
     """
 
     order: Order = "forward"
     memory: int | None = None
+    sanitize: bool = False
 
     def open(self, systems: Sequence[System], dtype: type[np.floating[Any]]) -> SourceEngine:
         """Make an engine over the simulator."""
         from spem.fields.solvers.cuda.engine import CudaEngine
 
-        return CudaEngine(systems, dtype, SimulatedRuntime(self.order, memory=self.memory))
+        return CudaEngine(systems, dtype, SimulatedRuntime(self.order, self.sanitize, self.memory))

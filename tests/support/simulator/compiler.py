@@ -6,8 +6,10 @@ import ctypes
 import getpass
 import hashlib
 import os
+import platform
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -39,6 +41,25 @@ class Library:
 def find_compiler() -> str | None:
     """Return the C++ compiler, if there is one."""
     return shutil.which("g++") or shutil.which("clang++")
+
+
+def find_sanitizer() -> str | None:
+    """Return the library of g++'s address sanitizer, if there is one."""
+    compiler = shutil.which("g++")
+    if compiler is None or platform.machine() != "x86_64":
+        return None
+    library = _call([compiler, "-print-file-name=libasan.so"], "").strip()
+    return library if Path(library).is_file() else None
+
+
+def spawn_sanitized(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run Python with the sanitizers loaded, so that a runtime can be made with ``sanitize=True``."""
+    paths = os.pathsep.join((str(SHIM.parents[1]), os.environ.get("PYTHONPATH", "")))
+    # Python does not free all it takes, and fibers jump between stacks that the sanitizer does not know.
+    settings = "detect_leaks=0:detect_stack_use_after_return=0"
+    loaded = {"LD_PRELOAD": str(find_sanitizer()), "ASAN_OPTIONS": settings, "PYTHONPATH": paths}
+    command = [sys.executable, *arguments]
+    return subprocess.run(command, env=os.environ | loaded, capture_output=True, text=True)
 
 
 def build(text: str, macros: Mapping[str, int], sanitize: bool = False) -> Library:

@@ -57,7 +57,8 @@ class SimulatedRuntime:
     order
         In which threads run between barriers, and blocks of a grid: a result that depends on it is a race.
     sanitize
-        Compile kernels with the sanitizers of the compiler, and leave guards to them.
+        Compile kernels with the sanitizers of the compiler, which end the process where a kernel does wrong;
+        it must have been started with them, see `spawn_sanitized` of the compiler.
     memory
         Bytes of the device, over which allocations fail.
     """
@@ -157,6 +158,8 @@ class SimulatedRuntime:
         guarded = Guarded(n_bytes)
         values = guarded.values.view(dtype).reshape(shape)
         poison(values)
+        if self._sanitize:
+            guarded.seal()
         self._used += n_bytes
         weakref.finalize(guarded, self._give_back, n_bytes)
         return DeviceArray(values, guarded)

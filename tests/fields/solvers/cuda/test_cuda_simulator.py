@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from simulator import SimulatedRuntime, arrays
-from simulator.compiler import find_compiler
+from simulator.compiler import find_compiler, find_sanitizer, spawn_sanitized
 from simulator.memory import FaultError
 
 from spem.fields.solvers.cuda.programs import kernels, read_source
@@ -216,6 +217,31 @@ def test_device_arrays_compute() -> None:
     assert device.sum().shape == ()
     with pytest.raises(TypeError, match="written to twice"):
         device[arrays.asarray(device[0, :2] * 0).astype(np.int64)] = device
+
+
+SANITIZED = """
+import sys
+import numpy as np
+from simulator import SimulatedRuntime
+
+runtime = SimulatedRuntime("shuffled", sanitize=True)
+rows, sums = runtime.zeros((256, 8), np.float32), runtime.empty((2, 2, 8), np.float64)
+runtime.compile(sys.argv[1]).launch("reduce_tiles", 2, sums, rows)
+shift = np.int32(sys.argv[2])
+runtime.compile(sys.argv[1]).launch("shifted_read", 1, runtime.zeros(256, np.float32), rows[:32], shift)
+print(runtime.download(sums).sum())
+"""
+
+
+@pytest.mark.skipif(find_sanitizer() is None, reason="g++ has no address sanitizer here")
+def test_sanitizers_find_reads_out_of_bounds() -> None:
+    """A kernel that keeps to its arrays runs under the sanitizers; one that reads past them is stopped."""
+    good = spawn_sanitized("-c", SANITIZED, SOURCE, "0")
+    assert (good.stdout.strip(), good.stderr) == ("0.0", "")
+    bad = spawn_sanitized("-c", SANITIZED, SOURCE, "2000")
+    assert re.search(
+        r"AddressSanitizer: use-after-poison.*READ of size 4.* in shifted_read ", bad.stderr, re.DOTALL
+    )
 
 
 def test_xp_has_only_what_cupy_has() -> None:
