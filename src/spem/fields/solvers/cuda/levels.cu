@@ -6,7 +6,7 @@
 //
 // Rows of a colour go brick by brick of SIDE^DIM voxels, in C order within a brick. A tile is then compact, and
 // its rows share their neighbours: in a solid ball of 2.1 million voxels a tile gathers 2.1 other rows for each
-// of its own, where C order throughout would take 3.9 (a disk: 1.4 and 2.9), all from the level-2 cache.
+// of its own, where C order throughout would take 3.9 (a disk: 1.3 and 2.9), all from the level-2 cache.
 //
 // Bytes moved for DIM = 3, what is filled before included: per cell of the grid 6; per node of the finest level
 // 9 for marks, 32 for rows, 100 for neighbours and 72 for values; then per row of each level 9 for marks, 28 for

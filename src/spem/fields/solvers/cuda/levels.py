@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from spem.errors import ParameterError
 from spem.fields.operator import System
+from spem.fields.solvers.cuda.bricks import CELL_BYTES, brick_side, first_cells, lay_out
 from spem.fields.solvers.cuda.layout import Layout
 from spem.fields.solvers.cuda.runtime import THREADS, TILE, Program, Runtime
 from spem.fields.solvers.multigrid import COARSEST
-
-# Bytes of a grid cell: its mark, the cumulative sum, and as much again in case that is not made in place.
-_CELL_BYTES = 1 + 4 + 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +151,7 @@ class _Batch:
             raise ParameterError(msg)
         units = np.array([min(system.shape.spacing) for system in systems])
         first = np.cumsum([0, *(system.n_nodes for system in systems)], dtype=np.int64)
-        program = runtime.program("levels.cu", DIM=dimensions[0], SIDE=_brick_side(dimensions[0]))
+        program = runtime.program("levels.cu", DIM=dimensions[0], SIDE=brick_side(dimensions[0]))
         return cls(systems, runtime, program, units, first)
 
     @property
@@ -178,13 +176,13 @@ class _Batch:
         """Lay out the finest level: rows of nodes, and voxels of rows."""
         runtime, n = self.runtime, np.int64(self.n_nodes)
         grid = np.array([system.shape.mask.shape for system in self.systems], np.int32)
-        first_cell = _first_cells(grid, np.ones(len(grid), np.bool_))
+        first_cell = first_cells(grid, np.ones(len(grid), np.bool_))
         voxels = runtime.upload(_joined([system.shape.voxels for system in self.systems]))
         where = voxels, first, runtime.upload(grid), runtime.upload(first_cell)
         sizes = np.int32(len(grid)), n
         marks = runtime.zeros((int(first_cell[-1]),), np.int8)
         self._launch("mark_nodes", int(n), *where, *sizes, marks)
-        layout, n_marked, base = _lay_out(marks, first_cell, runtime)
+        layout, n_marked, base = lay_out(marks, first_cell, runtime)
         del marks
         rows = runtime.empty((int(n),), np.int32)
         position = _filled(runtime, (layout.n_rows,), np.int64, -1)
@@ -242,11 +240,11 @@ class _Batch:
         """Lay out the next level: parents of rows, children and positions of coarse rows."""
         runtime, n = self.runtime, fine.n_rows
         coarse_grid = (stage.grid + 1) // 2
-        first_cell = _first_cells(coarse_grid, large)
+        first_cell = first_cells(coarse_grid, large)
         where = stage.position, fine.tile_system, runtime.upload(stage.grid), runtime.upload(first_cell)
         marks = runtime.zeros((int(first_cell[-1]),), np.int8)
         self._launch("mark_blocks", n, *where, np.int64(n), marks)
-        layout, n_marked, base = _lay_out(marks, first_cell, runtime)
+        layout, n_marked, base = lay_out(marks, first_cell, runtime)
         del marks
         parent = runtime.empty((n,), np.int32)
         children = _filled(runtime, (layout.n_rows, 2 ** stage.grid.shape[1]), np.int32, n)
@@ -288,50 +286,21 @@ def hierarchy_bytes(systems: Sequence[System]) -> Footprint:
     n, rows = int(nodes.sum()), int((nodes + 2 * (TILE - 1)).sum())
     # rows of nodes, the table, and the diagonals in both precisions
     held = 4 * n + rows * (8 * d + 24)
-    cells = int(_first_cells(grid, np.ones(len(grid), np.bool_))[-1])
-    numbered = 8 * n + max(_CELL_BYTES * cells, 4 * cells + 4 * n + 8 * rows)
+    cells = int(first_cells(grid, np.ones(len(grid), np.bool_))[-1])
+    numbered = 8 * n + max(CELL_BYTES * cells, 4 * cells + 4 * n + 8 * rows)
     peak = max(numbered, (4 + 8 * d) * n + (8 + 8 * d) * rows, 8 * n + 8 * rows + held)
     level, large = 0, nodes > COARSEST
     while large.any():
         level, grid = level + 1, (grid + 1) // 2
-        cells = int(_first_cells(grid, large)[-1])
+        cells = int(first_cells(grid, large)[-1])
         counts = np.minimum(np.prod(grid, axis=1), edges + (nodes - edges) // 2 ** (level * d))
         coarse = int((counts + 2 * (TILE - 1))[large].sum())
         held += 4 * rows  # parents
         joined, graph = coarse * (4 * 2**d + 8), coarse * (16 * d + 8)
-        peak = max(peak, held + 8 * rows + max(_CELL_BYTES * cells, 4 * cells + joined, joined + graph))
+        peak = max(peak, held + 8 * rows + max(CELL_BYTES * cells, 4 * cells + joined, joined + graph))
         held += joined - 8 * coarse + graph
         rows, large = coarse, large & (counts > COARSEST)
     return Footprint(peak, held)
-
-
-def _brick_side(d: int) -> int:
-    """Voxels along the side of a brick, whose rows are one tile, or two."""
-    return int({1: 2 * TILE, 2: 16, 3: 8, 4: 4}.get(d, 2))
-
-
-def _first_cells(grid: NDArray[Any], large: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """First red and first black cell of each system, in whole bricks, and their number; only of `large`."""
-    d = grid.shape[1]
-    side = _brick_side(d)
-    bricks = np.prod(-(-grid.astype(np.int64) // side), axis=1)
-    cells = np.where(large, bricks * side**d // 2, 0)
-    return np.cumsum(np.concatenate([[0], np.repeat(cells, 2)]), dtype=np.int64)
-
-
-def _lay_out(marks: Any, first_cell: NDArray[np.int64], runtime: Runtime) -> tuple[Layout, Any, Any]:
-    """Lay out marked cells; the row of one is their number up to it and a base, (n_systems, 2), together."""
-    n_marked = runtime.xp.cumsum(marks, dtype=np.int32)
-    before = _sums_before(n_marked, first_cell, runtime)
-    layout = Layout.of(np.diff(before).reshape(-1, 2), runtime)
-    base = layout.first_row - before[:-1].reshape(-1, 2) - 1
-    return layout, n_marked, runtime.upload(base)
-
-
-def _sums_before(sums: Any, first: NDArray[np.int64], runtime: Runtime) -> NDArray[np.int64]:
-    """Sum before each of the given entries, from cumulative sums on the device."""
-    last = runtime.upload(np.maximum(first - 1, 0))
-    return np.where(first > 0, runtime.download(sums[last]), 0).astype(np.int64)
 
 
 def _filled(runtime: Runtime, shape: tuple[int, ...], dtype: Any, value: int) -> Any:
