@@ -15,8 +15,9 @@ from spem.fields.solvers.host import Host
 from spem.fields.solvers.protocol import Solution
 from spem.fields.solvers.refinement import Refined, refine
 
-# On a device groups are solved together up to so many nodes: enough that kernels outlast their launches.
-_BATCH_NODES = 4_000_000
+# On a device groups are solved together up to so many nodes: about where passes over vectors outlast the
+# launches of their kernels. Estimated from bandwidth and launch times, not measured.
+_BATCH_NODES = 1_000_000
 # In units of the spacing; single precision holds the square of its inverse.
 _LEAST_RHO = 1e-6
 
