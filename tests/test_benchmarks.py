@@ -24,6 +24,7 @@ WITHOUT_DATA = (
     "server_load",
     "source_accuracy",
     "source_speed",
+    "sources",
     "spectra",
     "startup",
     "sweep_accuracy",
