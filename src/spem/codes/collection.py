@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from spem.codes.batches import encode_shapes
 from spem.codes.codes import Codes, Failure
 from spem.codes.device_work import DeviceWork
-from spem.codes.drafts import draft_shapes, finish_drafts
 from spem.codes.kinds import shape_features
 from spem.codes.listing import Listing
 from spem.codes.model import Model
@@ -156,17 +156,17 @@ def encode_file(
     """
     with threadpool_limits(1):
         given = as_source(source)
-        entries = (
-            _entries(given, model.settings, model)
-            if device is None
-            else finish_drafts(draft_shapes(given, model.settings, model), model.settings, model, device)
-        )
-    if len(entries) != 1:
-        msg = f"{source}: holds {len(entries)} labels; encode the file and query by one of its shapes"
-        raise ShapeError(msg)
-    if entries[0].reason:
-        raise ShapeError(entries[0].reason)
-    return np.asarray(entries[0].arrays[0], np.float32)
+        found = list(read_shapes(given, model.settings))
+        if len(found) != 1:
+            msg = f"{source}: holds {len(found)} labels; encode the file and query by one of its shapes"
+            raise ShapeError(msg)
+        [(suffix, shape)] = found
+        if isinstance(shape, SpemError):
+            raise ShapeError(one_line(shape))
+        model.require_ndim(shape.ndim, source_path(given) + suffix)
+        if device is not None:
+            return np.asarray(encode_shapes([shape], model, device=device)[0])
+        return model.encode(shape_features(shape, model.settings), shape.name)
 
 
 def merge(existing: Codes, new: Codes) -> Codes:
