@@ -4,9 +4,9 @@
 // write the same word write the same value, so levels do not depend on the order of threads. A position is
 // the flat C-order index of a voxel, or block, in the grid of its system; -1 marks padding rows.
 //
-// Rows of a colour go brick by brick of SIDE^DIM voxels, in C order within a brick. A tile is then compact, and
-// its rows share their neighbours: in a solid ball of 2.1 million voxels a tile gathers 2.1 other rows for each
-// of its own, where C order throughout would take 3.9 (a disk: 1.3 and 2.9), all from the level-2 cache.
+// Rows of a colour go brick by brick (cubes of `brick` voxels a side), in C order within a brick. A tile is then
+// compact, and its rows share their neighbours: in a solid ball of 2.1 million voxels a tile gathers 2.1 other rows
+// for each of its own, where C order throughout would take 3.9 (a disk: 1.3 and 2.9), all from the level-2 cache.
 //
 // Bytes moved for DIM = 3, what is filled before included: per cell of the grid 6; per node of the finest level
 // 9 for marks, 32 for rows, 100 for neighbours and 72 for values; then per row of each level 9 for marks, 28 for
@@ -37,17 +37,18 @@ __device__ inline int halve(int* index) {
 
 // Cells stand for voxels in the order of rows: red ones of a system, then black ones, each brick by brick, where
 // colours take turns on the last axis. `half` says that sides are those of the grid that blocks of it make up.
-__device__ inline long long cell_of(const int* index, const int* side, int half, const long long* first_cell) {
-    long long brick = 0;
+__device__ inline long long cell_of(const int* index, const int* side, int half, const long long* first_cell,
+                                    int brick) {
+    long long bricks = 0;
     int colour = 0, inside = 0, volume = 1;
     for (int axis = 0; axis < DIM; ++axis) {
         const int width = half ? (side[axis] + 1) / 2 : side[axis];
-        brick = brick * ((width + SIDE - 1) / SIDE) + index[axis] / SIDE;
-        inside = inside * SIDE + index[axis] % SIDE;
-        volume *= SIDE;
+        bricks = bricks * ((width + brick - 1) / brick) + index[axis] / brick;
+        inside = inside * brick + index[axis] % brick;
+        volume *= brick;
         colour ^= index[axis] & 1;
     }
-    return first_cell[colour] + (brick * volume + inside) / 2;
+    return first_cell[colour] + (bricks * volume + inside) / 2;
 }
 
 // The system that a node of the concatenated systems belongs to.
@@ -65,7 +66,7 @@ __device__ inline int system_of(long long node, const long long* first_node, int
 
 // Mark the cells of nodes: reads voxels (8 bytes a node), writes marks (1).
 extern "C" __global__ void mark_nodes(const long long* voxels, const long long* first_node, const int* grid,
-                                      const long long* first_cell, int n_systems, long long n_nodes,
+                                      const long long* first_cell, int brick, int n_systems, long long n_nodes,
                                       signed char* marks) {
     const long long node = (long long)blockIdx.x * THREADS + threadIdx.x;
     if (node >= n_nodes)
@@ -73,14 +74,15 @@ extern "C" __global__ void mark_nodes(const long long* voxels, const long long* 
     const int system = system_of(node, first_node, n_systems);
     int index[DIM];
     unravel(voxels[node], grid + DIM * system, index);
-    marks[cell_of(index, grid + DIM * system, 0, first_cell + 2 * system)] = 1;
+    marks[cell_of(index, grid + DIM * system, 0, first_cell + 2 * system, brick)] = 1;
 }
 
 // The row of each node, from the marked cells up to its own, and its voxel at that row: reads voxels and
 // n_marked (12 bytes a node), writes rows and position (12).
 extern "C" __global__ void number_nodes(const long long* voxels, const long long* first_node, const int* grid,
-                                        const long long* first_cell, const int* n_marked, const long long* base,
-                                        int n_systems, long long n_nodes, int* rows, long long* position) {
+                                        const long long* first_cell, int brick, const int* n_marked,
+                                        const long long* base, int n_systems, long long n_nodes, int* rows,
+                                        long long* position) {
     const long long node = (long long)blockIdx.x * THREADS + threadIdx.x;
     if (node >= n_nodes)
         return;
@@ -88,7 +90,7 @@ extern "C" __global__ void number_nodes(const long long* voxels, const long long
     const long long* cells = first_cell + 2 * system;
     int index[DIM];
     unravel(voxels[node], grid + DIM * system, index);
-    const long long cell = cell_of(index, grid + DIM * system, 0, cells);
+    const long long cell = cell_of(index, grid + DIM * system, 0, cells, brick);
     const long long row = base[2 * system + (cell >= cells[1])] + n_marked[cell];
     rows[node] = (int)row;
     position[row] = voxels[node];
@@ -121,7 +123,8 @@ extern "C" __global__ void place_values(const double* values, const int* rows, l
 // Mark the cells of blocks that hold a row: reads position (8 bytes a row), writes marks (1). A system
 // without cells is not coarsened any more.
 extern "C" __global__ void mark_blocks(const long long* position, const int* tile_system, const int* grid,
-                                       const long long* first_cell, long long n_rows, signed char* marks) {
+                                       const long long* first_cell, int brick, long long n_rows,
+                                       signed char* marks) {
     const long long row = (long long)blockIdx.x * THREADS + threadIdx.x;
     if (row >= n_rows || position[row] < 0)
         return;
@@ -133,15 +136,15 @@ extern "C" __global__ void mark_blocks(const long long* position, const int* til
     int index[DIM];
     unravel(position[row], side, index);
     halve(index);
-    marks[cell_of(index, side, 1, cells)] = 1;
+    marks[cell_of(index, side, 1, cells, brick)] = 1;
 }
 
 // Join rows to their blocks: reads position and n_marked (12 bytes a row), writes parent, children and the
 // position of the parent (16); rows with no block get the dummy row as their parent.
 extern "C" __global__ void join_blocks(const long long* position, const int* tile_system, const int* grid,
-                                       const long long* first_cell, const int* n_marked, const long long* base,
-                                       long long n_rows, int dummy, int* parent, int* children,
-                                       long long* parent_position) {
+                                       const long long* first_cell, int brick, const int* n_marked,
+                                       const long long* base, long long n_rows, int dummy, int* parent,
+                                       int* children, long long* parent_position) {
     const long long row = (long long)blockIdx.x * THREADS + threadIdx.x;
     if (row >= n_rows)
         return;
@@ -154,7 +157,7 @@ extern "C" __global__ void join_blocks(const long long* position, const int* til
     int index[DIM];
     unravel(position[row], side, index);
     const int corner = halve(index);
-    const long long cell = cell_of(index, side, 1, cells);
+    const long long cell = cell_of(index, side, 1, cells, brick);
     const long long above = base[2 * system + (cell >= cells[1])] + n_marked[cell];
     parent[row] = (int)above;
     children[above * CORNERS + corner] = (int)row;

@@ -151,7 +151,7 @@ class _Batch:
             raise ParameterError(msg)
         units = np.array([min(system.shape.spacing) for system in systems])
         first = np.cumsum([0, *(system.n_nodes for system in systems)], dtype=np.int64)
-        program = runtime.program("levels.cu", DIM=dimensions[0], SIDE=brick_side(dimensions[0]))
+        program = runtime.program("levels.cu", DIM=dimensions[0])
         return cls(systems, runtime, program, units, first)
 
     @property
@@ -178,7 +178,8 @@ class _Batch:
         grid = np.array([system.shape.mask.shape for system in self.systems], np.int32)
         first_cell = first_cells(grid, np.ones(len(grid), np.bool_))
         voxels = runtime.upload(_joined([system.shape.voxels for system in self.systems]))
-        where = voxels, first, runtime.upload(grid), runtime.upload(first_cell)
+        brick = np.int32(brick_side(grid.shape[1]))
+        where = voxels, first, runtime.upload(grid), runtime.upload(first_cell), brick
         sizes = np.int32(len(grid)), n
         marks = runtime.zeros((int(first_cell[-1]),), np.int8)
         self._launch("mark_nodes", int(n), *where, *sizes, marks)
@@ -241,7 +242,8 @@ class _Batch:
         runtime, n = self.runtime, fine.n_rows
         coarse_grid = (stage.grid + 1) // 2
         first_cell = first_cells(coarse_grid, large)
-        where = stage.position, fine.tile_system, runtime.upload(stage.grid), runtime.upload(first_cell)
+        tables = runtime.upload(stage.grid), runtime.upload(first_cell)
+        where = stage.position, fine.tile_system, *tables, np.int32(brick_side(stage.grid.shape[1]))
         marks = runtime.zeros((int(first_cell[-1]),), np.int8)
         self._launch("mark_blocks", n, *where, np.int64(n), marks)
         layout, n_marked, base = lay_out(marks, first_cell, runtime)
