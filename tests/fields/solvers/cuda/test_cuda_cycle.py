@@ -11,7 +11,9 @@ from simulator import SimulatedRuntime
 from spem.fields.operator import assemble
 from spem.fields.solvers.cuda.cycle import TAIL_TILES, Cycle, cycle_bytes
 from spem.fields.solvers.cuda.levels import Hierarchy
+from spem.fields.solvers.cuda.programs import read_source
 from spem.fields.solvers.engine import LANES
+from spem.fields.solvers.multigrid import COARSEST
 from spem.shapes.shape import Shape
 
 SHIFTS = np.geomspace(1e-3, 10.0, LANES)
@@ -215,3 +217,8 @@ def test_bytes_of_a_cycle():
     parts = [cycle_bytes(Rig(shape).hierarchy) for shape in (small, large)]
     assert cycle_bytes(Rig(small, large).hierarchy) == sum(parts)
     assert 200 < parts[1] / large.n_nodes < 400
+
+
+def test_kernels_know_the_size_of_the_coarsest_level():
+    """The constant in the source is that of the hierarchy."""
+    assert f"#define COARSEST {COARSEST} " in read_source("cycle.cu")

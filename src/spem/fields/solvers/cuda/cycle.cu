@@ -1,13 +1,13 @@
 // One symmetric V-cycle with red-black Gauss-Seidel: down red then black from zero, up black then red.
 //
-// A block of threads holds a tile of 128 rows of one system and one colour, two threads a row, four lanes each.
-// Edges join red and black only, so on the way down red values are r / d and nobody has to write them; what is
-// left of the residual sits on red rows and is the sum of w z over black neighbours; and on the way up only the
-// change of the red values, the coarse answer of their blocks, reaches the black ones. A pass reads its own
-// rows once from memory and its neighbours' mostly from cache.
+// A block of threads holds a tile of 128 rows of one system and one colour, two threads a row of four lanes.
+// Edges join red and black only. So on the way down red values are r / d, which nobody has to write; what is
+// left of the residual sits on red rows, and is the sum of w z over black neighbours; on the way up only what
+// red values change by, the coarse answers of their blocks, reaches the black ones. A pass reads its own rows
+// once from memory, and rows of neighbours, of which a tile has two to five times its own, mostly from cache.
 //
-// Bytes that each pass moves are given for float32 lanes, a row of lanes being 32 bytes, per row of the level.
-// All rows are numbered below 2^31 / (2 DIM).
+// The bytes that passes move are told per row of a level: 32 are the lanes of a vector, 8 DIM the neighbours
+// (on coarse levels 16 DIM, with their weights). Rows times 2 DIM or 2^DIM have to be below 2^31.
 
 #include "common.cuh"
 
@@ -41,7 +41,7 @@ struct Table {
     const float *diagonal;
     const float *mass;
     const int *parent;
-    const int *children;  // of the next level
+    const int *children;  // of the rows of the next level
     float *r;
     float *z;
     long long n_rows;
@@ -98,7 +98,8 @@ __device__ inline float4 inflow(const Graph &graph, int row, int half, const flo
 }
 
 // Black on the way down: z = (r + sum of w r / d over red neighbours) / d.
-__device__ inline void relax_down(const Graph &graph, int row, int half, float4 shift, const float *r, float *z) {
+__device__ inline void relax_down(const Graph &graph, int row, int half, float4 shift, const float *r,
+                                  float *z) {
     const Star star = star_of(graph, row);
     float4 sum = load(r, row, half);
 #pragma unroll
@@ -110,13 +111,17 @@ __device__ inline void relax_down(const Graph &graph, int row, int half, float4 
     store(z, row, half, sum * inverse_diagonal(graph, row, shift));
 }
 
-// Residual of a block: that of its red children, the corners an even number of steps from the first.
-__device__ inline void gather_residual(const Graph &fine, const int *children, int row, int half, const float *z,
-                                       float *coarse) {
+// Residual of a block: that of its red children, at the corners an even number of steps from the first.
+__device__ inline void gather_residual(const Graph &fine, const int *children, int row, int half,
+                                       const float *z, float *coarse) {
     float4 sum = splat(0.0f);
 #pragma unroll
     for (int corner = 0; corner < CORNERS; ++corner) {
-        if ((corner ^ corner >> 1 ^ corner >> 2 ^ corner >> 3) & 1)
+        int odd = 0;
+#pragma unroll
+        for (int axis = 0; axis < DIM; ++axis)
+            odd ^= corner >> axis & 1;
+        if (odd)
             continue;
         const int child = children[row * CORNERS + corner];
         if (child < fine.n_rows)
@@ -141,7 +146,8 @@ __device__ inline float4 relax_black(const Graph &graph, const int *parent, int 
 }
 
 // Red on the way up: z = (r + sum of w z over black neighbours) / d; returns z.
-__device__ inline float4 relax_red(const Graph &graph, int row, int half, float4 shift, float4 residual, float *z) {
+__device__ inline float4 relax_red(const Graph &graph, int row, int half, float4 shift, float4 residual,
+                                   float *z) {
     const float4 value = (residual + inflow(graph, row, half, z)) * inverse_diagonal(graph, row, shift);
     store(z, row, half, value);
     return value;
@@ -154,19 +160,19 @@ __device__ inline void write_product(float4 a, float4 b, int tile, double *parti
         partial[(long long)tile * LANES + threadIdx.x] = sum;
 }
 
-// Black tiles on the way down. Reads r and, of all rows, diagonal and mass (40 bytes a row), neighbours of
-// black rows, writes their z (16).
+// Black tiles on the way down. Reads r, diagonal and mass (40 bytes a row), and neighbours of black rows
+// (4 DIM), writes z of black rows (16).
 extern "C" __global__ void cycle_down(const int *tiles, const int *tile_system, const int *neighbours,
-                                      const float *weight, const float *diagonal, const float *mass, int n_rows,
-                                      int fine, const float *shift, const float *r, float *z) {
+                                      const float *weight, const float *diagonal, const float *mass,
+                                      int n_rows, int fine, const float *shift, const float *r, float *z) {
     const int tile = tiles[blockIdx.x], system = tile_system[tile];
     const int row = tile_row(tile), half = half_row();
     const Graph graph = graph_of(neighbours, weight, diagonal, mass, n_rows, fine, system);
     relax_down(graph, row, half, load(shift, system, half), r, z);
 }
 
-// Tiles of both colours of the coarser level. Reads z of black rows, neighbours of red ones and the children,
-// writes r of the coarser level.
+// Tiles of both colours of the coarser level. Reads z of black rows (16 bytes), neighbours of red rows
+// (4 DIM) and children (4), writes r of the coarser level (32 / 2^DIM).
 extern "C" __global__ void cycle_restrict(const int *tiles, const int *tile_system, const int *children,
                                           const int *neighbours, const float *weight, int n_rows, int fine,
                                           const float *z, float *coarse) {
@@ -176,12 +182,14 @@ extern "C" __global__ void cycle_restrict(const int *tiles, const int *tile_syst
     gather_residual(graph, children, row, half, z, coarse);
 }
 
-// Black tiles on the way up, and on the finest level their r z. Reads z of the coarser level, parents of red
-// rows, and of black rows r, z, neighbours, diagonal and mass, writes their z.
+// Black tiles on the way up, and on the finest level their r z. Reads z of the coarser level (32 / 2^DIM
+// bytes), parents of red rows (2), and of black rows z, diagonal, mass and neighbours (20 + 4 DIM) and on the
+// finest level r (16), writes their z (16).
 extern "C" __global__ void cycle_black(const int *tiles, const int *tile_system, const int *neighbours,
-                                       const float *weight, const float *diagonal, const float *mass, int n_rows,
-                                       int fine, const float *shift, const int *parent, int n_coarse,
-                                       const float *coarse, const float *r, float *z, double *partial) {
+                                       const float *weight, const float *diagonal, const float *mass,
+                                       int n_rows, int fine, const float *shift, const int *parent,
+                                       int n_coarse, const float *coarse, const float *r, float *z,
+                                       double *partial) {
     const int tile = tiles[blockIdx.x], system = tile_system[tile];
     const int row = tile_row(tile), half = half_row();
     const Graph graph = graph_of(neighbours, weight, diagonal, mass, n_rows, fine, system);
@@ -191,11 +199,12 @@ extern "C" __global__ void cycle_black(const int *tiles, const int *tile_system,
         write_product(load(r, row, half), value, tile, partial);
 }
 
-// Red tiles on the way up, and on the finest level their r z. Reads z of black rows, and of red rows r,
-// neighbours, diagonal and mass, writes their z.
+// Red tiles on the way up, and on the finest level their r z. Reads z of black rows (16 bytes), and of red
+// rows r, diagonal, mass and neighbours (20 + 4 DIM), writes their z (16).
 extern "C" __global__ void cycle_red(const int *tiles, const int *tile_system, const int *neighbours,
-                                     const float *weight, const float *diagonal, const float *mass, int n_rows,
-                                     int fine, const float *shift, const float *r, float *z, double *partial) {
+                                     const float *weight, const float *diagonal, const float *mass,
+                                     int n_rows, int fine, const float *shift, const float *r, float *z,
+                                     double *partial) {
     const int tile = tiles[blockIdx.x], system = tile_system[tile];
     const int row = tile_row(tile), half = half_row();
     const Graph graph = graph_of(neighbours, weight, diagonal, mass, n_rows, fine, system);
@@ -205,8 +214,8 @@ extern "C" __global__ void cycle_red(const int *tiles, const int *tile_system, c
         write_product(residual, value, tile, partial);
 }
 
-// Entry (i, j) of the inverse of a system's coarsest matrix, by lane; i runs fastest, so that threads of
-// neighbouring rows read neighbouring sectors.
+// Entry (i, j) of the inverse of a system's coarsest matrix, by lane; i runs fastest, so that threads of rows
+// side by side read sectors side by side.
 __device__ inline long long inverse_entry(int system, int i, int j) {
     return (((long long)system * COARSEST + j) * COARSEST + i) * LANES;
 }
@@ -226,9 +235,8 @@ __device__ inline int row_node(const Range &range, int row) {
     return row < range.middle * TILE ? row - range.first * TILE : range.n_red + row - range.middle * TILE;
 }
 
-// Invert a system's coarsest matrix for one lane, by Gauss and Jordan in double precision; an M-matrix needs no
-// pivots. One block a lane of a system, the lanes of systems[0] first. Reads the coarsest graph, writes at most
-// 9 kB a lane.
+// Invert a system's coarsest matrix for one lane, by Gauss and Jordan in double precision; an M-matrix needs
+// no search for pivots. One block a lane of a system. Reads the coarsest graph, writes at most 9 kB.
 extern "C" __global__ void cycle_invert(const int *systems, const long long *levels, const int *ranges,
                                         int n_systems, const int *depth, const float *shift, float *inverse) {
     __shared__ double matrix[COARSEST][COARSEST], column[COARSEST], line[COARSEST];
@@ -283,12 +291,12 @@ __device__ inline void solve_coarsest(const Range &range, int system, const floa
     store(z, node_row(range, node), half, sum);
 }
 
-// All of a cycle below the levels that have kernels of their own: one block a system goes from its entry level
-// to its coarsest, solves, and comes back. Levels are small, and their vectors stay in cache.
+// All of a cycle below the levels that have kernels of their own: one block a system goes from its entry
+// level to its coarsest, solves, and comes back. Levels are small, and their vectors stay in cache.
 extern "C" __global__ void __launch_bounds__(THREADS, 4)
-    cycle_tail(const int *systems, const long long *levels, const int *ranges,
-                                      int n_systems, const int *entry, const int *depth, const float *shift,
-                                      const float *inverse, const float *r, float *z, double *partial) {
+    cycle_tail(const int *systems, const long long *levels, const int *ranges, int n_systems, const int *entry,
+               const int *depth, const float *shift, const float *inverse, const float *r, float *z,
+               double *partial) {
     const int system = systems[blockIdx.x], row = tile_row(0), half = half_row();
     const int top = entry[system], bottom = depth[system];
     const float4 lanes = load(shift, system, half);

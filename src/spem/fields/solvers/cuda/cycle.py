@@ -179,7 +179,7 @@ def cycle_bytes(hierarchy: Hierarchy) -> int:
 
 
 def upload_lists(runtime: Runtime, lists: Sequence[NDArray[np.int32]]) -> list[Array]:
-    """Upload lists of tiles or systems in one transfer."""
+    """Upload int32 lists of tiles or systems in one transfer; the views of them on the device."""
     together = runtime.upload(np.concatenate(lists))
     ends = np.cumsum([part.size for part in lists]).tolist()
     return [together[start:end] for start, end in zip([0, *ends], ends, strict=False)]

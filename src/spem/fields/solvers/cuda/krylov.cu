@@ -1,8 +1,8 @@
 // Block conjugate gradients on the finest level: what lies between two cycles.
 //
-// A block of threads holds a tile of 128 rows, two threads a row, four lanes each; steps and turns are float32
-// ``(n_systems, LANES)``. x lags behind: the pass that turns p reads it anyhow, and takes x a step along the old
-// p before. Bytes are given per row; a row of lanes is 32 of them.
+// A block of threads holds a tile of 128 rows, two threads a row of four lanes; alpha and beta have a row of
+// lanes for each system. x is a step late: the pass that turns p reads p anyhow, and takes x along it first.
+// Bytes are told per row, 32 being the lanes of one vector.
 
 #include "common.cuh"
 
@@ -61,14 +61,16 @@ extern "C" __global__ void improve_residual(const int *tiles, const int *tile_sy
                                             const float *q, float *r) {
     const int tile = tiles[blockIdx.x], system = tile_system[tile];
     const int row = tile_row(tile), half = half_row();
-    store(r, row, half, fma4(splat(0.0f) - load(alpha, system, half), load(q, row, half), load(r, row, half)));
+    const float4 step = splat(0.0f) - load(alpha, system, half);
+    store(r, row, half, fma4(step, load(q, row, half), load(r, row, half)));
 }
 
 // Largest magnitude of z in each tile: reads z (32).
 extern "C" __global__ void peak(const int *tiles, const float *z, double *partial) {
     const int tile = tiles[blockIdx.x];
     const float4 value = load(z, tile_row(tile), half_row());
-    const double largest = tile_max(widen(make_float4(fabsf(value.x), fabsf(value.y), fabsf(value.z), fabsf(value.w))));
+    const float4 size = make_float4(fabsf(value.x), fabsf(value.y), fabsf(value.z), fabsf(value.w));
+    const double largest = tile_max(widen(size));
     if (threadIdx.x < LANES)
         partial[(long long)tile * LANES + threadIdx.x] = largest;
 }
