@@ -12,7 +12,8 @@ from sklearn.base import clone
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from spem.codes.normalise import Normalisation, peak_share
-from spem.codes.vlad import VLAD, encode, vlad
+from spem.codes.vlad import VLAD, aggregate, concatenate, encode, vlad
+from spem.codes.vocabulary import sum_residuals
 from spem.errors import ParameterError
 
 
@@ -101,6 +102,21 @@ def test_levels_do_not_depend_on_the_unit_of_the_maps():
     learner = VLAD(5, levels=4, random_state=0).fit(shapes)
     again = [np.tile(1000 * maps, (2, 1)) for (maps,) in shapes]
     np.testing.assert_allclose(learner.transform(again), learner.transform(shapes), atol=1e-9)
+
+
+@pytest.mark.parametrize("moments", [1, 2])
+def test_sums_over_words_are_enough(moments):
+    """A code comes from the sums of each band and level without the nodes, bit by bit."""
+    rng = np.random.default_rng(3)
+    maps, words = rng.random((2, 60, 3)), rng.random((2, 5, 3))
+    normals, cuts = [Normalisation.standard([rng.random((9, 3))])] * 2, [np.array([0.3, 0.7])] * 2
+    spreads = list(rng.random((2, 5, 3))) if moments == 2 else None
+    whole = encode(tuple(maps), normals, words, 0.5, spreads, cuts)
+    parts = []
+    for band, normal, centers, spread in zip(maps, normals, words, spreads or [None] * 2, strict=True):
+        levels = np.searchsorted(cuts[0], peak_share(band))
+        parts.append(aggregate(sum_residuals(normal.apply(band), centers, levels, 3), 0.5, spread))
+    assert np.array_equal(concatenate(parts), whole)
 
 
 def test_vlad_of_nodes_on_their_centres_is_zero():

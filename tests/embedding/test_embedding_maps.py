@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import spem
-from spem.embedding.maps import compute_maps
+from spem.embedding.maps import compute_maps, principal_components
 from spem.errors import ParameterError
 from spem.fields.operator import assemble
 from spem.fields.solvers.direct import Direct
@@ -108,6 +108,17 @@ def test_maps_do_not_depend_on_the_unit(cross):
     """With the default range, a shape in other units has the same maps."""
     scaled = Shape(cross.mask, (0.2, 0.2), (0.0, 0.0))
     assert np.allclose(spem.maps(cross).values, spem.maps(scaled).values, atol=1e-5)
+
+
+def test_small_matrices_are_enough(cross):
+    """Basis, variances and what maps are mixed of come without the nodes."""
+    field = spem.sweep(cross, rho=RHO, rtol=1e-10)
+    maps = compute_maps(field, 4)
+    found = principal_components(field.gram, field.coefficients(), RHO, cross.n_nodes, 4)
+    assert np.allclose(found.mix[0] + field.basis @ found.mix[1:], maps.values, atol=1e-9)
+    assert np.array_equal(found.basis, maps.basis)
+    assert np.array_equal(found.variance, maps.variance)
+    assert found.total_variance == maps.total_variance
 
 
 def test_labels(cross):
