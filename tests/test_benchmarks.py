@@ -10,6 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from backends import missing
+from simulator import SimulatedRuntime
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 KEYS = {"benchmark", "quick", "machine", "facts", "tables", "targets", "skipped"}
@@ -156,3 +158,27 @@ def test_a_section_that_fails_ends_no_other(tmp_path, monkeypatch):
     kept = json.loads((tmp_path / "b.json").read_text(encoding="utf-8"))
     assert kept["skipped"] == ["bad: FAILED with KeyError: 'none'"]
     assert list(kept["tables"]) == ["good"]
+
+
+@pytest.mark.skipif(missing("simulated") is not None, reason=str(missing("simulated")))
+def test_gpu_side_is_measured_beside_the_processor(tmp_path, monkeypatch):
+    """With a device, here a simulated one, each table has its rows, and kernels have one of their own."""
+    monkeypatch.syspath_prepend(str(FOLDER))
+    import _sides
+    import gpu_sweep
+
+    monkeypatch.setattr(gpu_sweep, "find_device", lambda: (_sides.Device(SimulatedRuntime()), ""))
+    monkeypatch.setattr(gpu_sweep, "QUICK_SIZES", (300,))
+    monkeypatch.setattr(gpu_sweep, "QUICK_BATCHES", {300: (2,)})
+    monkeypatch.setattr(gpu_sweep, "RHOS", (8,))
+    sections = [word for name in ("bandwidth", "nodes", "rho", "batch") for word in ("--only", name)]
+    with pytest.raises(SystemExit) as stop:
+        gpu_sweep.main(["--quick", *sections, "--out", str(tmp_path)])
+    assert stop.value.code == 0
+    [path] = tmp_path.glob("*.json")
+    result = json.loads(path.read_text(encoding="utf-8"))
+    assert result["skipped"] == []
+    for title, rows in result["tables"].items():
+        assert {row.get("side") for row in rows} <= {"CPU", "GPU (the simulator)", None}
+        assert title.startswith("kernels") or len(rows) == 2
+    assert {row["stage"] for row in result["tables"]["kernels of the GPU, alone"]} == set(gpu_sweep.KERNELS)

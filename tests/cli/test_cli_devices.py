@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
+from spem.codes.codes import Codes
 from spem.errors import MissingExtraError, ParameterError, SpemError
 from spem.fields.solvers.cuda import cupy_runtime, device, listing
 from spem.fields.solvers.host import Host
 
+QUICK = ("--own-grid", "--features", "spem", "--n-maps", "3", "--n-centers", "4", "--n-rho", "16")
 Spem = Callable[..., Result]
 Refused = Callable[..., None]
 ABSENT = {
@@ -113,3 +115,15 @@ def test_single_sources_stay_on_the_processor(
     result = spem("field", image, "--source", "5,5", "-o", tmp_path / "f.npz", "--device", "cuda")
     refused(result, "--device cuda", "every digit")
     assert present == [0]
+
+
+def test_collections_run_on_the_device(spem: Spem, folder: Path, tmp_path: Path, present: list[int]) -> None:
+    """Codes and rows that a device makes, here the processor as one, are those of processes."""
+    here, there, db = tmp_path / "here.spem", tmp_path / "there.spem", tmp_path / "shapes.db"
+    assert spem("encode", folder, "-o", here, *QUICK).exit_code == 0
+    assert spem("encode", folder, "-o", there, *QUICK, "--device", "cuda").exit_code == 0
+    np.testing.assert_array_equal(Codes.load(there).vectors, Codes.load(here).vectors)
+    result = spem("index", "add", db, folder, *QUICK, "--device", "cuda:1", "--json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["model"] == Codes.load(here).model.digest
+    assert present == [0, 1]

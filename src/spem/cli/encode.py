@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from spem.codes.codes import Codes, Failure
     from spem.codes.model import Model
     from spem.codes.settings import Settings
+    from spem.fields.solvers.engine import Backend
 
 
 @with_settings
@@ -68,7 +69,7 @@ def encode(
     """  # noqa: D301
     from spem.codes.settings import Settings
 
-    find_device(device)
+    where = find_device(device)
     if not paper:
         Settings.of(options)
     for target in (output, save_vocabulary):
@@ -83,6 +84,7 @@ def encode(
         prune=prune,
         paper=paper,
         jobs=jobs,
+        device=where,
     )
     if save_vocabulary is not None:
         codes.model.save(save_vocabulary)
@@ -101,6 +103,7 @@ def encode_paths(
     prune: bool = False,
     paper: bool = False,
     jobs: int | None = None,
+    device: Backend | None = None,
 ) -> tuple[Codes, tuple[Failure, ...]]:
     """Encode files into a codes file, or add them to it.
 
@@ -122,6 +125,8 @@ def encode_paths(
         Whether settings that were not asked for are those of the paper.
     jobs
         Number of processes; by the number of shapes where None.
+    device
+        Where SPEM maps and their codes are made; the processor when None.
 
     Returns
     -------
@@ -170,6 +175,7 @@ def encode_paths(
                 work=work,
                 progress=bar.advance,
                 on_failure=bar.fail,
+                device=device,
             )
             failures = codes.failures
             if known is not None:

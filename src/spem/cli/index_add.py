@@ -86,7 +86,7 @@ def add(
     from spem.codes.workers import count_processes
     from spem.index.index import Index
 
-    find_device(device)
+    where = find_device(device)
     settings = Settings.paper(**options) if paper else None
     Settings.of(options)
     metadata = {key: value or "" for key, value in parse_metadata(meta or []).items()}
@@ -106,6 +106,7 @@ def add(
                 metadata=metadata,
                 n_jobs=n_jobs,
                 cluster=cluster,
+                device=where,
                 retries=retries,
                 keep_shapes=not no_shapes,
                 prune=prune,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,6 +25,7 @@ _THUMBNAIL_DIMENSIONS = 3
 # As large as the cards of a gallery show them; the time grows with the area.
 _THUMBNAIL_PIXELS = 128
 _NO_CODE = np.empty(0, np.float32)
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +96,45 @@ def draft(
     SpemError
         When the source cannot be read, has changed since it was listed, or its only shape has no features.
     """
+
+    def features(shape: Shape) -> Bands:
+        return shape_features(shape, settings, threads)
+
+    for row, found in bare_rows(item, settings, features, model=model, keep_shape=keep_shape):
+        yield Draft(None, reason=found) if isinstance(found, str) else Draft(row, found)
+
+
+def bare_rows(
+    item: Item,
+    settings: Settings,
+    compute: Callable[[Shape], T],
+    *,
+    model: Model | None = None,
+    keep_shape: bool = True,
+) -> Iterator[tuple[Row | None, T | str]]:
+    """Read the shapes of a source, and make their rows without a code.
+
+    Parameters
+    ----------
+    item
+        The source.
+    settings
+        How it is read.
+    compute
+        What codes are to be made of, of a shape.
+    model, keep_shape
+        As `draft` takes them.
+
+    Yields
+    ------
+    tuple
+        The row of each shape, and what was computed; of a label that gives none, None and the reason.
+
+    Raises
+    ------
+    SpemError
+        As by `draft`.
+    """
     name, path = source_name(item.source), source_path(item.source)
     for suffix, shape in read_shapes(item.source, settings):
         try:
@@ -102,14 +143,25 @@ def draft(
             _require_unchanged(item)
             if model is not None:
                 model.require_ndim(shape.ndim, path + suffix)
-            features = shape_features(shape, settings, threads)
+            computed = compute(shape)
             row = _bare_row(shape, item.key, suffix, name + suffix, path, keep_shape=keep_shape)
         except SpemError as error:
             if not suffix:
                 raise
-            yield Draft(None, reason=f"{suffix.lstrip('-')}: {one_line(error)}")
+            yield None, label_reason(suffix, one_line(error))
         else:
-            yield Draft(row, features)
+            yield row, computed
+
+
+def label_reason(suffix: str, reason: str) -> str:
+    """Say which label of a source gives nothing, and why.
+
+    Examples
+    --------
+    >>> label_reason("-3", "too thin")
+    '3: too thin'
+    """
+    return f"{suffix.lstrip('-')}: {reason}"
 
 
 def finish(drafts: Iterator[Draft] | list[Draft], model: Model) -> Described:

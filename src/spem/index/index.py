@@ -15,10 +15,12 @@ from spem.codes.codes import Codes, Failure
 from spem.codes.model import Model
 from spem.codes.settings import Settings
 from spem.errors import ParameterError
+from spem.fields.solvers.engine import Backend
 from spem.index.adding import Added, Manner, Progress, add_sources, agreed_settings
 from spem.index.answers import Answers
 from spem.index.choosing import models_for
 from spem.index.cluster import ClusterExecutor
+from spem.index.device import DeviceExecutor
 from spem.index.duplicates import DISTANCE, Duplicates, find_duplicates
 from spem.index.executors import LocalExecutor
 from spem.index.optimizing import Optimized, optimize
@@ -98,6 +100,7 @@ class Index(Records):
         metadata: Mapping[str, str] | None = None,
         n_jobs: int = 1,
         cluster: str | None = None,
+        device: Backend | None = None,
         retries: int = 2,
         keep_shapes: bool = True,
         prune: bool = False,
@@ -129,6 +132,8 @@ class Index(Records):
             Number of processes.
         cluster
             Address of a Dask scheduler that encodes in their place.
+        device
+            Where SPEM maps and their codes are made, in batches, such as ``spem.Cuda()``; processes read.
         retries
             How often a shape whose worker on the cluster died is tried again.
         keep_shapes
@@ -156,7 +161,10 @@ class Index(Records):
             raise ParameterError(msg)
         if isinstance(model, str) or (model is None and self.store.digests() and not new_model):
             model = self.model(model)
-        local = LocalExecutor(n_jobs)
+        if cluster is not None and device is not None:
+            msg = f"cluster={cluster} and device={device} exclude each other; give one of them"
+            raise ParameterError(msg)
+        local = LocalExecutor(n_jobs) if device is None else DeviceExecutor(device, n_jobs)
         manner = Manner(
             settings=agreed_settings(options, settings, model),
             labels=labels if isinstance(labels, Mapping) else read_labels(labels) if labels else {},
