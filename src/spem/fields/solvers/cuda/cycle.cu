@@ -4,7 +4,7 @@
 // Edges join red and black only. So on the way down red values are r / d, which nobody has to write; what is
 // left of the residual sits on red rows, and is the sum of w z over black neighbours; on the way up only what
 // red values change by, the coarse answers of their blocks, reaches the black ones. A pass reads its own rows
-// once from memory, and rows of neighbours, of which a tile has two to five times its own, mostly from cache.
+// once from memory; rows of neighbours, of which a tile has about twice its own, come mostly from cache.
 //
 // The bytes that passes move are told per row of a level: 32 are the lanes of a vector, 8 DIM the neighbours
 // (on coarse levels 16 DIM, with their weights). Rows times 2 DIM or 2^DIM have to be below 2^31.

@@ -34,7 +34,7 @@ extern "C" __global__ void search_finish(const int *tiles, const int *tile_syste
 }
 
 // Multiply q = (A + s M) p, and p q of each tile: reads p, neighbours, diagonal and mass, writes q
-// (72 + 8 DIM). Turning p here as well would save p once, and read both z and p of all neighbours from cache.
+// (72 + 8 DIM). Turning p here as well would read it once less, but gather z and p of all neighbours.
 extern "C" __global__ void search_multiply(const int *tiles, const int *tile_system, const int *neighbours,
                                            const float *weight, const float *diagonal, const float *mass,
                                            const float *shift, const float *p, float *q, double *partial) {
