@@ -94,8 +94,10 @@ class CupyProgram:
         known.check(arguments)
         if n_blocks == 0:
             return
+        # CuPy passes None as no argument at all, which the driver reads; the null pointer is a number.
+        passed = tuple(np.int64(0) if argument is None else argument for argument in arguments)
         try:
-            function((n_blocks,), (THREADS,), arguments)
+            function((int(n_blocks),), (THREADS,), passed)
         except self._cupy.cuda.driver.CUDADriverError as error:
             if error.status != _OUT_OF_MEMORY:
                 raise
