@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from backends import DEVICES, use_backend
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 from simulator import Simulated
 
 import spem
@@ -68,6 +71,21 @@ def test_single_sources_agree_with_the_direct_solver(sources, rho):
     direct = source_values(sources, rho)
     found = source_values(sources, rho, solver=MultigridGradients(rtol=1e-9))
     assert np.all(np.abs(found - direct).max(axis=1) <= 1e-8 * direct.max(axis=1))
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    hnp.arrays(bool, hnp.array_shapes(min_dims=1, max_dims=4, min_side=1, max_side=7)).filter(np.any),
+    st.one_of(st.floats(0.1, 1e4), st.just(np.inf)),
+    st.integers(0, 9),
+)
+def test_any_shape_converges(mask, rho, seed):
+    """On any mask with voxels of any form the default settings keep the tolerance."""
+    spacing = tuple(10 ** np.random.default_rng(seed).uniform(-1, 0, mask.ndim))
+    sources = point_sources(assemble(Shape.from_mask(mask, spacing)))
+    direct = source_values(sources, rho)
+    found = source_values(sources, rho, solver=MultigridGradients())
+    assert np.all(np.abs(found - direct).max(axis=1) <= 1e-7 * direct.max(axis=1))
 
 
 @pytest.mark.parametrize("spread", [0.0, 6.0])

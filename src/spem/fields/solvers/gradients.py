@@ -38,7 +38,8 @@ class MultigridGradients:
         at most ‖b‖ and is not dominated by edges that are cut short; on `deficit_residual` of each field of
         the whole boundary.
     max_iterations
-        Limit for each right-hand side.
+        Limit for each right-hand side. Ten to twenty are usual; voxels that are a hundred times as long as
+        wide take hundreds.
     threads
         Threads for large shapes on the host; as many as the process may use when None. Results do not depend
         on it.
@@ -60,7 +61,7 @@ class MultigridGradients:
     entrywise: ClassVar[bool] = False
 
     rtol: float = 1e-8
-    max_iterations: int = 200
+    max_iterations: int = 1000
     threads: int | None = None
     device: Backend | None = None
 
