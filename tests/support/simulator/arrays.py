@@ -39,6 +39,8 @@ FUNCTIONS = frozenset(_FUNCTIONS.split())
 LINALG = frozenset(_LINALG.split())
 NAMES = frozenset(_NAMES.split())
 METHODS = frozenset(_METHODS.split())
+#: Options of NumPy's functions that CuPy's have not.
+ABSENT = frozenset({"where", "initial", "like", "subok", "casting"})
 
 
 class DeviceArray(NDArrayOperatorsMixin):
@@ -159,6 +161,12 @@ def _function(function: Callable[..., Any]) -> Callable[..., Any]:
     def call(*arguments: Any, **options: Any) -> Any:
         if function is np.repeat and not isinstance(arguments[1], int | np.integer | list | tuple):
             msg = "repeat takes counts of the host, a number or a list"
+            raise TypeError(msg)
+        if function is np.bincount and ("weights" in options or len(arguments) > 1):
+            msg = "bincount adds weights up in any order on a device"
+            raise TypeError(msg)
+        if options.keys() & ABSENT:
+            msg = f"{function.__name__} of CuPy has no {', '.join(options.keys() & ABSENT)}"
             raise TypeError(msg)
         opened = [_open(one) for one in arguments]
         with np.errstate(all="ignore"):

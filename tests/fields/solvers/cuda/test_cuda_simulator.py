@@ -181,8 +181,8 @@ def test_parameters_are_read_from_sources() -> None:
         kernels('extern "C" __global__ void f(Thing* a) {}')
 
 
-def test_device_arrays_never_mix_with_the_hosts() -> None:
-    """Arithmetic, indexing, functions and conversions across the border are refused."""
+def test_device_arrays_refuse_what_a_device_would() -> None:
+    """What mixes host and device, needs an order of additions, or is not CuPy's is refused."""
     device = SimulatedRuntime().upload(np.arange(4.0))
     host = np.arange(4)
     for mixed in (
@@ -199,6 +199,8 @@ def test_device_arrays_never_mix_with_the_hosts() -> None:
         lambda: bool(device[0] > 0),
         lambda: list(device),
         lambda: arrays.repeat(device, device),
+        lambda: arrays.bincount(device.astype(np.int64), device),
+        lambda: arrays.sum(device, where=device > 0),
     ):
         with pytest.raises(TypeError):
             mixed()

@@ -45,10 +45,10 @@ def require_device(driver: Any, index: int) -> None:
         msg = "no NVIDIA driver is installed here; install one, or leave the device to the CPU"
         raise ParameterError(msg)
     if version // 1000 < wanted // 1000:
+        major, minor = version // 1000, version % 1000 // 10
         msg = (
-            f"CuPy is for CUDA {wanted // 1000}, the driver for CUDA {version // 1000}.{version % 1000 // 10}: "
-            "update the driver, or "
-            f"pip uninstall cupy-cuda{wanted // 1000}x and pip install 'spem[cuda{version // 1000}]'"
+            f"CuPy is for CUDA {wanted // 1000}, the driver for CUDA {major}.{minor}: update the driver, or "
+            f"pip uninstall cupy-cuda{wanted // 1000}x and pip install 'spem[cuda{major}]'"
         )
         raise MissingExtraError(msg)
     try:
