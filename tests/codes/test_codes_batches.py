@@ -20,7 +20,7 @@ from spem.codes.features import swept_rho
 from spem.codes.kinds import shape_features
 from spem.codes.model import Model
 from spem.codes.settings import Settings
-from spem.errors import ConvergenceError, ModelError, ParameterError, ShapeError, SizeError
+from spem.errors import ConvergenceError, MissingExtraError, ModelError, ParameterError, ShapeError, SizeError
 from spem.fields.operator import System, assemble
 from spem.fields.solvers.batch import Batch
 from spem.fields.solvers.engine import SourceEngine
@@ -182,8 +182,32 @@ def test_maps_that_are_not_finite_are_refused(shapes: list[Shape], model: Model)
     with Sweep(device=Simulated()).batch(*zip(*map(ready, shapes[:1]), strict=True)) as batch:
         true = batch.engine.project
         batch.engine.project = lambda constant, mix: true(constant * np.nan, mix)
-        with pytest.raises(ParameterError, match="the maps of e0 contain NaN or inf; they must be finite"):
-            batch_codes(batch, model.parts[0], [np.ones(shapes[0].n_nodes, bool)])
+        [error] = batch_codes(batch, model.parts[0], [np.ones(shapes[0].n_nodes, bool)])
+    assert isinstance(error, ParameterError)
+    assert str(error) == "the maps of e0 contain NaN or inf; they must be finite"
+
+
+def test_batches_follow_each_other(shapes: list[Shape], model: Model) -> None:
+    """Codes keep the order of the shapes over several batches."""
+    device = Small(Host(), 10_000)
+    codes = encode_shapes(shapes, model, device=device, max_nodes=300)
+    np.testing.assert_array_equal(codes, encode_shapes(shapes, model, device=Host()))
+    assert device.asked == [1, 1, 1]
+
+
+def test_missing_device_is_told_at_once(shapes: list[Shape], model: Model) -> None:
+    """What is wrong with the device is no failure of a shape."""
+
+    class Missing:
+        """A device that needs what is not installed."""
+
+        def open(self, *_: object) -> SourceEngine:
+            """Refuse."""
+            message = "no such package"
+            raise MissingExtraError(message)
+
+    with pytest.raises(MissingExtraError, match="no such package"):
+        list(part_codes(shapes, model.parts[0], device=Missing()))
 
 
 def test_sweep_that_misses_its_tolerance_costs_one_shape(

@@ -17,6 +17,7 @@ from spem.codes.bands import Bands
 from spem.codes.features import band_rho, node_features
 from spem.codes.part import Part
 from spem.codes.settings import Settings
+from spem.codes.vocabulary import Residuals
 from spem.codes.word_sums import Kept, Rows, WordSums
 from spem.embedding.maps import principal_components
 from spem.errors import ParameterError, SizeError
@@ -41,21 +42,25 @@ def project_maps(batch: Batch, settings: Settings, band: int) -> Array:
     Array
         ``(n_rows, n_maps)`` float32 on the device.
     """
-    constant, mix = [], []
-    for index, (system, reduced) in enumerate(zip(batch.systems, batch.reduced, strict=True)):
-        rho = band_rho(system.shape, settings, band)
-        found = principal_components(
-            reduced.gram,
-            batch.coefficients(index, rho),
-            rho,
-            system.n_nodes,
-            settings.n_maps,
-            centred=settings.centred,
-        )
-        constant.append(found.mix[0])
-        mix.append(reduced.turn @ found.mix[1:])
+    mixes = [_mix(batch, index, settings, band) for index in range(len(batch))]
     engine: Any = batch.engine
-    return engine.project(np.stack(constant), np.stack(mix))
+    return engine.project(*(np.stack(each) for each in zip(*mixes, strict=True)))
+
+
+def _mix(
+    batch: Batch, index: int, settings: Settings, band: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the coefficients of one shape's maps in the constant and in the columns of the engine."""
+    system, reduced = batch.systems[index], batch.reduced[index]
+    if not batch.outcome.converged[index]:
+        # fails later, with its best iterate, and keeps no other shape from its maps
+        return np.zeros(settings.n_maps), np.zeros((len(reduced.turn), settings.n_maps))
+    rho = band_rho(system.shape, settings, band)
+    coefficients = batch.coefficients(index, rho)
+    found = principal_components(
+        reduced.gram, coefficients, rho, system.n_nodes, settings.n_maps, centred=settings.centred
+    )
+    return found.mix[0], reduced.turn @ found.mix[1:]
 
 
 def batch_features(batch: Batch, settings: Settings, kept: Sequence[Kept]) -> list[Bands]:
@@ -93,7 +98,7 @@ def batch_features(batch: Batch, settings: Settings, kept: Sequence[Kept]) -> li
     ]
 
 
-def batch_codes(batch: Batch, part: Part, kept: Sequence[Kept]) -> list[NDArray[np.float64]]:
+def batch_codes(batch: Batch, part: Part, kept: Sequence[Kept]) -> list[NDArray[np.float64] | ParameterError]:
     """Make the codes of all shapes of a batch.
 
     Parameters
@@ -108,12 +113,10 @@ def batch_codes(batch: Batch, part: Part, kept: Sequence[Kept]) -> list[NDArray[
     Returns
     -------
     list
-        For each shape ``(n_code,)``, as `Part.encode` returns it.
+        For each shape ``(n_code,)``, as `Part.encode` returns it; where maps are not finite, the error.
 
     Raises
     ------
-    ParameterError
-        When maps are not finite.
     SizeError
         When they do not fit into the memory of the device.
     """
@@ -130,13 +133,15 @@ def batch_codes(batch: Batch, part: Part, kept: Sequence[Kept]) -> list[NDArray[
             WordSums.of(part, band, rows, engine.runtime)(project_maps(batch, part.settings, band))
             for band in range(len(part.centers))
         ]
-    codes = []
-    for system, *found in zip(batch.systems, *bands, strict=True):
-        if not all(np.isfinite(each.squares).all() for each in found):
-            msg = f"the maps of {system.shape.name} contain NaN or inf; they must be finite"
-            raise ParameterError(msg)
-        codes.append(part.encode_residuals(found))
-    return codes
+    names = (system.shape.name for system in batch.systems)
+    return [_code(part, found, name) for name, *found in zip(names, *bands, strict=True)]
+
+
+def _code(part: Part, found: Sequence[Residuals], name: str) -> NDArray[np.float64] | ParameterError:
+    """Make the code of one shape of its sums, which are finite where maps are."""
+    if not all(np.isfinite(each.squares).all() for each in found):
+        return ParameterError(f"the maps of {name} contain NaN or inf; they must be finite")
+    return part.encode_residuals(found)
 
 
 @contextmanager

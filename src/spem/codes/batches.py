@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -16,9 +17,10 @@ from spem.codes.model import Model
 from spem.codes.part import Part
 from spem.codes.settings import Settings
 from spem.codes.word_sums import Kept
-from spem.errors import SpemError
+from spem.errors import MissingExtraError, SpemError
 from spem.fields.operator import System, assemble
 from spem.fields.solvers.batch import Batch
+from spem.fields.solvers.cuda.device import Cuda
 from spem.fields.solvers.engine import Backend
 from spem.fields.solvers.sweep import Sweep
 from spem.shapes.shape import Shape
@@ -31,7 +33,7 @@ BATCH_NODES = 4_000_000
 _EACH = 256
 
 T = TypeVar("T")
-Make = Callable[[Batch, Sequence[Kept]], Sequence[T]]
+Make = Callable[[Batch, Sequence[Kept]], Sequence[T | SpemError]]
 
 
 def batches(counts: Sequence[int], max_nodes: int = BATCH_NODES) -> list[range]:
@@ -56,6 +58,23 @@ def batches(counts: Sequence[int], max_nodes: int = BATCH_NODES) -> list[range]:
             start, held = index, 0
         held += count + _EACH
     return [*found, range(start, len(counts))] if len(counts) else []
+
+
+def require_device(device: Backend) -> None:
+    """Raise at once what using a device would, before shapes are read.
+
+    Raises
+    ------
+    MissingExtraError, ParameterError
+        When there is no such device, or it cannot be used; see `spem.fields.solvers.cuda.device.Cuda`.
+
+    Examples
+    --------
+    >>> from spem.fields.solvers.host import Host
+    >>> require_device(Host())
+    """
+    if isinstance(device, Cuda):
+        device.runtime()
 
 
 def encode_shapes(
@@ -172,7 +191,7 @@ def part_codes(
     """Yield for each shape the code of one kind of features, or why there is none; see `encode_shapes`."""
     if part.settings.features == ON_DEVICE:
 
-        def make(batch: Batch, kept: Sequence[Kept]) -> Sequence[NDArray[np.float64]]:
+        def make(batch: Batch, kept: Sequence[Kept]) -> Sequence[NDArray[np.float64] | SpemError]:
             return batch_codes(batch, part, kept)
 
         return _swept(shapes, part.settings, Sweep(rtol, device=device), make, max_nodes)
@@ -215,10 +234,19 @@ def _swept(
     shapes: Sequence[Shape], settings: Settings, sweep: Sweep, make: Make[T], max_nodes: int
 ) -> Iterator[T | SpemError]:
     """Yield for each shape what is made of its sweep, or why there is nothing."""
-    for places in batches([shape.n_nodes for shape in shapes], max_nodes):
-        given = [_attempt(lambda shape: _ready(shape, settings), shapes[place]) for place in places]
-        made = iter(_together([each for each in given if isinstance(each, _Ready)], sweep, make))
-        yield from (next(made) if isinstance(each, _Ready) else each for each in given)
+    plan = batches([shape.n_nodes for shape in shapes], max_nodes)
+
+    def prepare(places: range) -> list[_Ready | SpemError]:
+        return [_attempt(lambda shape: _ready(shape, settings), shapes[place]) for place in places]
+
+    # The next batch is discretised while this one is on the device.
+    with ThreadPoolExecutor(1) as pool:
+        ahead = [pool.submit(prepare, places) for places in plan[:1]]
+        for number in range(len(plan)):
+            given = ahead.pop().result()
+            ahead = [pool.submit(prepare, places) for places in plan[number + 1 : number + 2]]
+            made = iter(_together([each for each in given if isinstance(each, _Ready)], sweep, make))
+            yield from (next(made) if isinstance(each, _Ready) else each for each in given)
 
 
 def _ready(shape: Shape, settings: Settings) -> _Ready:
@@ -237,6 +265,8 @@ def _together(ready: Sequence[_Ready], sweep: Sweep, make: Make[T]) -> list[T | 
         with sweep.batch(systems, rho) as batch:
             made = make(batch, kept)
             return [_missed(batch, index) or each for index, each in enumerate(made)]
+    except MissingExtraError:
+        raise
     except SpemError as error:
         if len(ready) == 1:
             return [error]

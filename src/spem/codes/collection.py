@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from spem.codes.batches import encode_shapes
+from spem.codes.batches import encode_shapes, require_device
 from spem.codes.codes import Codes, Failure
 from spem.codes.device_work import DeviceWork
 from spem.codes.kinds import shape_features
@@ -91,6 +91,8 @@ def encode_collection(
         When there is no source.
     ModelError
         When `settings`, `model` and `known` do not go together.
+    MissingExtraError
+        When the device needs a package that is not installed.
 
     Examples
     --------
@@ -102,6 +104,8 @@ def encode_collection(
     if not sources:
         msg = "no sources were given; give files or shapes"
         raise ParameterError(msg)
+    if device is not None:
+        require_device(device)
     if known is not None:
         model = known.model if model is None else model
         known.require_same_model(model, "the vocabulary")
