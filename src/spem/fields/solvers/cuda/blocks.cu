@@ -65,17 +65,17 @@ __device__ inline Quad mix_basis(const Real* const* blocks, int n_blocks, const 
     return sum;
 }
 
-// Half row of v, and of A v.
-template <class T>
+// Half row of A v, from that of v; the two edges along an axis have the same weight. Neighbours are read along AXES
+// axes at a time.
+template <int AXES, class T>
 __device__ inline Quad multiply(const int* neighbours, const double* weights, double diagonal, const T* v,
                                 size_t row, int half, Quad here) {
     const int2* pair = reinterpret_cast<const int2*>(neighbours) + row * DIM;
     Quad value = diagonal * here;
-#pragma unroll
+#pragma unroll AXES
     for (int axis = 0; axis < DIM; axis++) {
         const int2 next = pair[axis];
-        value = fma4(-weights[2 * axis], read(v, next.x, half), value);
-        value = fma4(-weights[2 * axis + 1], read(v, next.y, half), value);
+        value = fma4(-weights[2 * axis], read(v, next.x, half) + read(v, next.y, half), value);
     }
     return value;
 }
@@ -151,7 +151,7 @@ extern "C" __global__ void __launch_bounds__(THREADS)
                      const double* diagonal, const double* mass, const double* shifts, const double* u, float* r) {
     const int tile = tiles[blockIdx.x], system = tile_system[tile], row = tile_row(tile), half = half_row();
     const Quad here = read(u, row, half), one = {1.0, 1.0, 1.0, 1.0};
-    const Quad product = multiply(neighbours, weights + system * 2 * DIM, diagonal[row], u, row, half, here);
+    const Quad product = multiply<DIM>(neighbours, weights + system * 2 * DIM, diagonal[row], u, row, half, here);
     write(r, row, half, mass[row] * read(shifts, system, half) * (one - here) - product);
 }
 
@@ -163,19 +163,35 @@ extern "C" __global__ void __launch_bounds__(THREADS)
     write(v, row, half, read(v, row, half) + read(x, row, half));
 }
 
-// Rows of a tile in shared memory: X, and with three products A X and the diagonal of M, and a block's.
-template <class X, int PRODUCTS>
+// r = b - (A + s M) v, and r·r of each tile, double[n_tiles][LANES].
+// Bytes a row: 64 of v and of b, 8 DIM of neighbours, 16 of diagonal and mass, and 32 of r.
+extern "C" __global__ void __launch_bounds__(THREADS)
+    source_residual(const int* tiles, const int* tile_system, const int* neighbours, const double* weights,
+                    const double* diagonal, const double* mass, const double* shifts, const double* b,
+                    const double* v, float* r, double* partial) {
+    const int tile = tiles[blockIdx.x], system = tile_system[tile], row = tile_row(tile), half = half_row();
+    const Quad here = read(v, row, half);
+    const Quad product = multiply<DIM>(neighbours, weights + system * 2 * DIM, diagonal[row], v, row, half, here);
+    const Quad value = read(b, row, half) - product - mass[row] * read(shifts, system, half) * here;
+    write(r, row, half, value);
+    const double square = tile_sum(value * value);
+    if (threadIdx.x < LANES) partial[static_cast<size_t>(tile) * LANES + threadIdx.x] = square;
+}
+
+// Rows of a tile in shared memory: X, and with three products A X and the diagonal of M, and a block's; widened
+// once, as that is slow.
+template <int PRODUCTS>
 struct Rows {
-    alignas(16) X x[TILE * LANES];
+    alignas(16) double x[TILE * LANES];
+    alignas(16) double block[2][TILE * LANES];
     alignas(16) double ax[PRODUCTS == 1 ? 1 : TILE * LANES];
     double mass[PRODUCTS == 1 ? 1 : TILE];
-    alignas(16) Real block[2][TILE * LANES];
 };
 
 // Add the products of columns of a tile with X, A X and M X. Thread t has entry t % SQUARE and every fourth row:
 // a warp reads parts of one row at a time, and no bank of shared memory twice.
-template <class T, class X, int PRODUCTS>
-__device__ inline void cross_tile(const T* columns, const Rows<X, PRODUCTS>& rows, double (&sum)[PRODUCTS]) {
+template <int PRODUCTS>
+__device__ inline void cross_tile(const double* columns, const Rows<PRODUCTS>& rows, double (&sum)[PRODUCTS]) {
     const int i = threadIdx.x % SQUARE / LANES, j = threadIdx.x % LANES;
 #pragma unroll 2
     for (int row = threadIdx.x / SQUARE; row < TILE; row += THREADS / SQUARE) {
@@ -190,13 +206,12 @@ __device__ inline void cross_tile(const T* columns, const Rows<X, PRODUCTS>& row
 
 // Add the sums of the columns of X and of M X in a tile to sum, double[2][THREADS] in shared memory, where there
 // is more room than in registers. Thread t has column t % LANES.
-template <class X>
-__device__ inline void sum_columns(const Rows<X, 3>& rows, double* sum) {
+__device__ inline void sum_columns(const Rows<3>& rows, double* sum) {
     const int j = threadIdx.x % LANES;
     double all = 0.0, weighted = 0.0;
     for (int row = threadIdx.x / LANES; row < TILE; row += THREADS / LANES) {
         all += rows.x[row * LANES + j];
-        weighted = fma(rows.mass[row], (double)rows.x[row * LANES + j], weighted);
+        weighted = fma(rows.mass[row], rows.x[row * LANES + j], weighted);
     }
     sum[threadIdx.x] += all;
     sum[THREADS + threadIdx.x] += weighted;
@@ -232,8 +247,8 @@ __device__ inline Chunk chunk_of(const int* chunks, const int* chunk_tile, const
 }
 
 // Add the products of the blocks of a group with the tile of X in shared memory.
-template <class X, int PRODUCTS>
-__device__ inline void cross_group(const Chunk& chunk, int row, int half, Rows<X, PRODUCTS>& rows,
+template <int PRODUCTS>
+__device__ inline void cross_group(const Chunk& chunk, int row, int half, Rows<PRODUCTS>& rows,
                                    double (&sum)[GROUP(PRODUCTS)][PRODUCTS]) {
     const int own = threadIdx.x / 2;
 #pragma unroll
@@ -242,10 +257,7 @@ __device__ inline void cross_group(const Chunk& chunk, int row, int half, Rows<X
         if (number > chunk.n_blocks) break;
         if (number < chunk.n_blocks) write(rows.block[k % 2], own, half, read(chunk.blocks[number], row, half));
         __syncthreads();
-        if (number < chunk.n_blocks)
-            cross_tile(rows.block[k % 2], rows, sum[k]);
-        else
-            cross_tile(rows.x, rows, sum[k]);
+        cross_tile(number < chunk.n_blocks ? rows.block[k % 2] : rows.x, rows, sum[k]);
     }
 }
 
@@ -264,43 +276,22 @@ __device__ inline void write_group(const Chunk& chunk, const double (&sum)[GROUP
     }
 }
 
-// r = b - (A + s M) v, and r·r of each chunk, double[n_chunks][LANES].
-// Bytes a row: 64 of v and of b, 8 DIM of neighbours, 16 of diagonal and mass, and 32 of r.
-extern "C" __global__ void __launch_bounds__(THREADS)
-    source_residual(const int* chunks, const int* chunk_tile, const int* tile_system, const int* neighbours,
-                    const double* weights, const double* diagonal, const double* mass, const double* shifts,
-                    const double* b, const double* v, float* r, double* partial) {
-    const int number = chunks[blockIdx.x], first = chunk_tile[number], half = half_row();
-    const int system = tile_system[first];
-    const Quad shift = read(shifts, system, half);
-    Quad square = {0.0, 0.0, 0.0, 0.0};
-    for (int tile = first; tile < chunk_tile[number + 1]; tile++) {
-        const int row = tile_row(tile);
-        const Quad here = read(v, row, half);
-        const Quad product = multiply(neighbours, weights + system * 2 * DIM, diagonal[row], v, row, half, here);
-        const Quad value = read(b, row, half) - product - mass[row] * shift * here;
-        write(r, row, half, value);
-        square = square + value * value;
-    }
-    const double sum = tile_sum(square);
-    if (threadIdx.x < LANES) partial[static_cast<size_t>(number) * LANES + threadIdx.x] = sum;
-}
-
 // Products BᵀX and XᵀX of each chunk. Grid: the chunks of the list times the groups of blocks.
 // Bytes a row: 32 of X for each group, and LANES * sizeof(Real) for each block.
 extern "C" __global__ void __launch_bounds__(THREADS)
     cross(const int* chunks, const int* chunk_tile, const Real* const* blocks, int n_blocks, const float* x,
           double* partial) {
-    __shared__ Rows<float, 1> rows;
+    __shared__ Rows<1> rows;
     __shared__ double scratch[THREADS];
     int number;
     const Chunk chunk = chunk_of(chunks, chunk_tile, blocks, n_blocks, GROUP(1), number);
     const int own = threadIdx.x / 2, half = half_row();
     double sum[GROUP(1)][1] = {};
+#pragma unroll 1
     for (int tile = chunk.first_tile; tile < chunk.end_tile; tile++) {
         const int row = tile_row(tile);
         __syncthreads();
-        store(rows.x, own, half, load(x, row, half));
+        write(rows.x, own, half, read(x, row, half));
         cross_group(chunk, row, half, rows, sum);
     }
     write_group(chunk, sum, scratch, partial + static_cast<size_t>(number) * (n_blocks + 1) * SQUARE);
@@ -313,7 +304,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 4)
     cross_operator(const int* chunks, const int* chunk_tile, const int* tile_system, const Real* const* blocks,
                    int n_blocks, const Real* c, const int* neighbours, const double* weights,
                    const double* diagonal, const double* mass, double* partial) {
-    __shared__ Rows<Real, 3> rows;
+    __shared__ Rows<3> rows;
     __shared__ double scratch[THREADS], column_sum[2 * THREADS];
     int number;
     const Chunk chunk = chunk_of(chunks, chunk_tile, blocks, n_blocks, GROUP(3), number);
@@ -322,10 +313,11 @@ extern "C" __global__ void __launch_bounds__(THREADS, 4)
     weights += tile_system[chunk.first_tile] * 2 * DIM;
     double sum[GROUP(3)][3] = {};
     column_sum[threadIdx.x] = column_sum[THREADS + threadIdx.x] = 0.0;
+#pragma unroll 1
     for (int tile = chunk.first_tile; tile < chunk.end_tile; tile++) {
         const int row = tile_row(tile);
         const Quad here = read(c, row, half);
-        const Quad product = multiply(neighbours, weights, diagonal[row], c, row, half, here);
+        const Quad product = multiply<1>(neighbours, weights, diagonal[row], c, row, half, here);
         __syncthreads();
         write(rows.x, own, half, here);
         write(rows.ax, own, half, product);
@@ -341,22 +333,22 @@ extern "C" __global__ void __launch_bounds__(THREADS, 4)
     join_threads(column_sum[THREADS + threadIdx.x], LANES, scratch, entries + LANES);
 }
 
-// Sums of entries over the chunks of each system of the list, double[n_systems][n_entries]. Eight threads share
-// the chunks of an entry, each in order, and their sums are added in order.
+// Sums of the rows of partial, double[..][n_entries], over each run of the list; run k is of the rows from first[k]
+// up to first[k + 1]. Eight threads share the rows of an entry, each in order, and their sums are added in order.
 extern "C" __global__ void __launch_bounds__(THREADS)
-    sum_chunks(const int* systems, const int* first_chunk, const double* partial, int n_entries, double* out) {
+    sum_runs(const int* runs, const int* first, const double* partial, int n_entries, double* out) {
     __shared__ double scratch[THREADS];
     const int width = THREADS / 8, groups = (n_entries + width - 1) / width;
-    const int system = systems[blockIdx.x / groups];
+    const int run = runs[blockIdx.x / groups];
     const int entry = (int)blockIdx.x % groups * width + (int)threadIdx.x % width;
     double sum = 0.0;
     if (entry < n_entries)
-        for (int chunk = first_chunk[system] + threadIdx.x / width; chunk < first_chunk[system + 1]; chunk += 8)
-            sum += partial[static_cast<size_t>(chunk) * n_entries + entry];
+        for (int row = first[run] + threadIdx.x / width; row < first[run + 1]; row += 8)
+            sum += partial[static_cast<size_t>(row) * n_entries + entry];
     scratch[threadIdx.x] = sum;
     __syncthreads();
     if (threadIdx.x >= width || entry >= n_entries) return;
     sum = 0.0;
     for (int t = threadIdx.x; t < THREADS; t += width) sum += scratch[t];
-    out[static_cast<size_t>(system) * n_entries + entry] = sum;
+    out[static_cast<size_t>(run) * n_entries + entry] = sum;
 }

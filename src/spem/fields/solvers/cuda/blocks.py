@@ -8,15 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spem.fields.solvers.cuda.cycle import upload_lists
 from spem.fields.solvers.cuda.layout import Layout
 from spem.fields.solvers.cuda.levels import Hierarchy
-from spem.fields.solvers.cuda.runtime import Array, Runtime, addresses
+from spem.fields.solvers.cuda.runtime import TILE, Array, Runtime, addresses
 from spem.fields.solvers.engine import LANES, Products, Small
 
 # Products are summed over chunks of at least so many tiles, and at most so many chunks a system: blocks of
 # threads enough for a device, and few sums to keep.
 _CHUNK_TILES, _MOST_CHUNKS = 8, 1024
-# Entries that a block of threads of `sum_chunks` has.
+# Entries that a block of threads of `sum_runs` has.
 _SUMMED = 32
 # As GROUP in blocks.cu.
 _GROUP, _GROUP_OPERATOR = 4, {np.dtype(np.float32): 2, np.dtype(np.float64): 1}
@@ -93,10 +94,11 @@ class Blocks:
 
     def select(self, active: Flags) -> None:
         """Work on these systems only, ``(n_systems,)``."""
-        systems = np.flatnonzero(active).astype(np.int32)
+        lists = np.flatnonzero(active), self._chunks.of_systems(active), self.layout.tiles(active)
         self.active = active
-        self.tiles = self.runtime.upload(self.layout.tiles(active))
-        self._lists = self.runtime.upload(systems), self.runtime.upload(self._chunks.of_systems(active))
+        self._chosen, self._chosen_chunks, self.tiles = upload_lists(
+            self.runtime, [part.astype(np.int32) for part in lists]
+        )
 
     @property
     def n_columns(self) -> int:
@@ -122,13 +124,16 @@ class Blocks:
 
     def source_residual(self, b: Array, v: Array, r: Array, shifts: Small) -> Small:
         """Write r = b − (A + s M) v, float32, and return r·r in double precision, ``(n_systems, LANES)``."""
-        tables = self.layout.tile_system, *self._graph, self._upload(shifts)
-        return self._sum("source_residual", 1, LANES, *tables, b, v, r)
+        tiles = self.runtime.empty((self.layout.n_rows // TILE, LANES), np.float64)
+        self._launch_tiles("source_residual", *self._graph, self._upload(shifts), b, v, r, tiles)
+        chunks = self._partial(LANES)
+        self._sum(self._chosen_chunks, self._chunks.tile, tiles, chunks)
+        return self._total(chunks)
 
     def overlaps(self, x: Array) -> Small:
         """Inner products ``(n_systems, K + LANES, LANES)`` of the basis, then of x, with x."""
         entries = (len(self.arrays) + 1) * LANES * LANES
-        found = self._sum("cross", self._groups(_GROUP), entries, *self._basis, x)
+        found = self._cross("cross", _GROUP, entries, *self._basis, x)
         return found.reshape(len(found), -1, LANES)
 
     def append(self, x: Array, mix: Small, remove: Small) -> Products:
@@ -147,15 +152,14 @@ class Blocks:
         mixes = self._upload(mix), *self._basis, self._upload(remove)
         self._launch_tiles("make_block", x, *mixes, new)
         entries = (len(self.arrays) + 1) * 3 * LANES * LANES + 2 * LANES
-        groups = self._groups(_GROUP_OPERATOR[self.dtype])
         tables = self.layout.tile_system, *self._basis, new, *self._graph
-        found = self._sum("cross_operator", groups, entries, *tables)
+        found = self._cross("cross_operator", _GROUP_OPERATOR[self.dtype], entries, *tables)
         self.arrays.append(new)
         self._table = self.runtime.upload(addresses(self.runtime, self.arrays))
         square, sums = found[:, : -2 * LANES], found[:, -2 * LANES :]
         parts = square.reshape(len(found), -1, 3, LANES, LANES)
-        wide = (parts[:, :, product].reshape(len(found), -1, LANES) for product in range(3))
-        return Products(*wide, sums[:, :LANES], sums[:, LANES:])
+        gram, stiffness, mass = (parts[:, :, k].reshape(len(found), -1, LANES) for k in range(3))
+        return Products(gram, stiffness, mass, sums[:, :LANES], sums[:, LANES:])
 
     def project(self, constant: Small, mix: Small, dtype: Any = np.float32) -> Array:
         """Make constant + B·mix of all systems, on the device.
@@ -197,20 +201,28 @@ class Blocks:
         """Launch a kernel of one block of threads a tile."""
         self._program.launch(kernel, self.tiles.size, self.tiles, self.layout.tile_system, *arguments)
 
-    def _groups(self, size: int) -> int:
-        """Count the groups of the blocks and one more."""
-        return len(self.arrays) // size + 1
-
-    def _sum(self, kernel: str, groups: int, entries: int, *arguments: Any) -> Small:
-        """Sum over systems, ``(n_systems, entries)``, what a kernel sums over chunks in groups of entries."""
-        systems, chunks = self._lists
-        partial = self.runtime.empty((int(self._chunks.first[-1]), entries), np.float64)
-        found = self.runtime.zeros((self.active.size, entries), np.float64)
+    def _cross(self, kernel: str, group: int, entries: int, *arguments: Any) -> Small:
+        """Return what a kernel sums over chunks, for so many blocks at a time, summed over systems."""
+        groups, chunks = len(self.arrays) // group + 1, self._chosen_chunks
+        partial = self._partial(entries)
         self._program.launch(kernel, chunks.size * groups, chunks, self._chunks.tile, *arguments, partial)
-        width = -(-entries // _SUMMED)
-        tables = systems, self._chunks.first_on_device, partial, np.int32(entries), found
-        self._program.launch("sum_chunks", systems.size * width, *tables)
+        return self._total(partial)
+
+    def _partial(self, entries: int) -> Array:
+        """Make room for sums over chunks."""
+        return self.runtime.empty((int(self._chunks.first[-1]), entries), np.float64)
+
+    def _total(self, partial: Array) -> Small:
+        """Sum over the chunks of each active system, ``(n_systems, entries)``; zeros for the others."""
+        found = self.runtime.zeros((self.active.size, partial.shape[1]), np.float64)
+        self._sum(self._chosen, self._chunks.first_on_device, partial, found)
         return np.asarray(self.runtime.download(found))
+
+    def _sum(self, runs: Array, first: Array, partial: Array, out: Array) -> None:
+        """Sum the rows of each run of a list."""
+        entries = partial.shape[1]
+        groups = -(-entries // _SUMMED)
+        self._program.launch("sum_runs", runs.size * groups, runs, first, partial, np.int32(entries), out)
 
     def _upload(self, values: Small) -> Array:
         """Small matrices on the device; None where there is nothing."""

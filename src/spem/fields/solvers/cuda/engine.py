@@ -31,6 +31,8 @@ from spem.fields.solvers.engine import LANES, Products, Small
 # Bytes of a row of lanes in single precision.
 _ROW = 4 * LANES
 
+_ADVICE = "sweep fewer shapes at a time, or coarser ones, or on the processor"
+
 Flags = NDArray[np.bool_]
 
 
@@ -75,14 +77,18 @@ class CudaEngine:
         self._workspace: Workspace | None = None
         self._sources: Sources | None = None
         self._active = np.ones(len(systems), bool)
-        self._closed = False
         require_numbers(systems)
         self._bytes_with = partial(engine_bytes, systems, dtype)
         self._free = runtime.free_bytes()
         if self._bytes_with(EXPECTED_BLOCKS) > self._free:
-            raise SizeError(self._too_large(EXPECTED_BLOCKS))
+            free = f"{runtime.name}, which has {_told(self._free)} free"
+            msg = f"{self._sizes(EXPECTED_BLOCKS)} on {free}; {_ADVICE}"
+            raise SizeError(msg)
         with self._stage("hierarchy", self._bytes_with(0)):
             self._workspace = Workspace.of(systems, dtype, runtime, self._meter)
+        hierarchy, n_nodes = self._workspace.hierarchy, int(self.counts.sum())
+        self._cycle_bytes = cycle_bytes(hierarchy) / n_nodes
+        self._iteration_bytes = bytes_per_iteration(hierarchy) / n_nodes - self._cycle_bytes
 
     @property
     def hierarchy(self) -> Hierarchy:
@@ -160,7 +166,7 @@ class CudaEngine:
         return self._project(constant, mix, np.float32)
 
     def to_nodes(self, table: Array) -> list[NDArray[Any]]:
-        """Bring a table of rows to the host, in one transfer: each system's ``(n_nodes, k)`` in node order."""
+        """Bring a table of rows to the host in one transfer: each system's ``(n_nodes, k)``, by node."""
         rows = self._open.hierarchy.rows
         with self._stage("transfers", 3 * table.dtype.itemsize * rows.size * table.shape[1]):
             values = self.runtime.download(table[rows])
@@ -198,7 +204,6 @@ class CudaEngine:
 
     def close(self) -> None:
         """Give memory back to the device; what is asked for afterwards is refused."""
-        self._closed = True
         self._workspace = self._sources = None
         self.runtime.release()
 
@@ -241,8 +246,7 @@ class CudaEngine:
         return self._open.krylov.precondition()
 
     def _count_cycle(self) -> None:
-        share = self._share / self.counts.sum()
-        self._meter.count("cycle", share * cycle_bytes(self.hierarchy))
+        self._meter.count("cycle", self._share * self._cycle_bytes)
 
     def _project(self, constant: Small, mix: Small, dtype: type[np.floating[Any]]) -> Array:
         work = self._open
@@ -269,12 +273,6 @@ class CudaEngine:
         """Bytes of a row of the graph in double precision: neighbours, diagonal and mass."""
         return 8 * self._dimension + 16
 
-    @property
-    def _iteration_bytes(self) -> float:
-        """Bytes of a row in an iteration, without the cycle."""
-        hierarchy = self.hierarchy
-        return (bytes_per_iteration(hierarchy) - cycle_bytes(hierarchy)) / int(self.counts.sum())
-
     @contextmanager
     def _stage(self, name: str, n_bytes: float = 0) -> Iterator[None]:
         """Time and count what is done within; a device out of memory gives back what it has."""
@@ -286,16 +284,17 @@ class CudaEngine:
             traceback.clear_frames(error.__traceback__)
             n_blocks = len(self._workspace.blocks.arrays) + 1 if self._workspace is not None else 0
             self.close()
-            raise SizeError(self._too_large(n_blocks)) from error
+            msg = (
+                f"{self.runtime.name} ran out of memory, with {_told(self._free)} free at first: "
+                f"{self._sizes(n_blocks)}; {_ADVICE}"
+            )
+            raise SizeError(msg) from error
 
-    def _too_large(self, n_blocks: int) -> str:
+    def _sizes(self, n_blocks: int) -> str:
+        """Say how large the batch is."""
         batch = told(self.counts.size, int(self.counts.sum()))
-        return (
-            f"{batch} take about {_gib(self._bytes_with(n_blocks))} with {LANES * n_blocks} columns on "
-            f"{self.runtime.name}, which has {_gib(self._free)} free; "
-            "sweep fewer shapes at a time, or coarser ones, or on the processor"
-        )
+        return f"{batch} with {LANES * n_blocks} columns take about {_told(self._bytes_with(n_blocks))}"
 
 
-def _gib(n_bytes: int) -> str:
-    return f"{n_bytes / 2**30:.3g} GiB"
+def _told(n_bytes: int) -> str:
+    return f"{n_bytes / 2**30:.1f} GiB" if n_bytes >= 2**30 else f"{n_bytes / 2**20:.1f} MiB"
