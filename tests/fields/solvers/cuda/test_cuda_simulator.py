@@ -169,7 +169,7 @@ def test_parameters_are_read_from_sources() -> None:
         'using Real = double; extern "C" __global__ void __launch_bounds__(256) '
         "f(const float4* __restrict__ a, float* const* b, /* c, */ Real* d, unsigned int n, long long m) {}"
     )
-    found = [(one.name, one.pointer, *one.dtypes) for one in kernels(text)["f"].parameters]
+    found = [(one.name, one.pointer, *map(str, one.dtypes)) for one in kernels(text)["f"].parameters]
     assert found == [
         ("a", True, "float32"),
         ("b", True, "int64"),

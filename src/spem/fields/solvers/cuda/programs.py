@@ -54,20 +54,20 @@ class Parameter:
     pointer
         Whether it takes an array.
     dtypes
-        Names of the types that fit: one, or as many as an alias may stand for.
+        The types that fit: one, or as many as an alias may stand for.
     """
 
     name: str
     pointer: bool
-    dtypes: frozenset[str]
+    dtypes: frozenset[np.dtype[Any]]
 
     def fits(self, argument: Any) -> bool:
         """Whether an argument is a contiguous device array, or a NumPy scalar, of the right type."""
         if not self.pointer:
-            return isinstance(argument, np.generic) and argument.dtype.name in self.dtypes
+            return isinstance(argument, np.generic) and argument.dtype in self.dtypes
         if isinstance(argument, np.ndarray | np.generic) or not hasattr(argument, "flags"):
             return argument is None
-        return bool(argument.dtype.name in self.dtypes and argument.flags.c_contiguous)
+        return argument.dtype in self.dtypes and bool(argument.flags.c_contiguous)
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Kernel:
         for parameter, argument in zip(self.parameters, arguments, strict=True):
             if not parameter.fits(argument):
                 kind = "a contiguous device array of" if parameter.pointer else "a scalar"
-                wanted = f"{kind} {' or '.join(sorted(parameter.dtypes))}"
+                wanted = f"{kind} {' or '.join(sorted(one.name for one in parameter.dtypes))}"
                 msg = (
                     f"kernel {self.name}, argument {parameter.name}: expected {wanted}, got {_told(argument)}"
                 )
@@ -119,7 +119,7 @@ def kernels(text: str) -> dict[str, Kernel]:
     Examples
     --------
     >>> kernels('extern "C" __global__ void fill(float* v, int n) {}')["fill"].parameters[0].dtypes
-    frozenset({'float32'})
+    frozenset({dtype('float32')})
     """
     text = _COMMENT.sub(" ", text)
     aliases: dict[str, set[str]] = {}
@@ -167,19 +167,19 @@ def _parameter(kernel: str, listing: str, aliases: Mapping[str, set[str]]) -> Pa
     stars, name = words.count("*"), words[-1]
     kind = " ".join(word for word in words[:-1] if word != "*")
     if stars == 2:
-        return Parameter(name, True, frozenset({"int64"}))
+        return Parameter(name, True, frozenset({np.dtype(np.int64)}))
     dtypes = frozenset(_number(kernel, alias, stars == 1) for alias in aliases.get(kind, {kind}))
     return Parameter(name, stars == 1, dtypes)
 
 
-def _number(kernel: str, kind: str, pointer: bool) -> str:
+def _number(kernel: str, kind: str, pointer: bool) -> np.dtype[Any]:
     """Type of NumPy of a type of C, or of the parts of a vector that a pointer points to."""
     kind = " ".join(kind.split())
     element = re.sub(r"^(float|double|int)[234]$", r"\1", kind) if pointer else kind
     if element not in _NUMBERS:
         msg = f"kernel {kernel}: a parameter of type {kind!r}, expected one of {', '.join(_NUMBERS)}"
         raise TypeError(msg)
-    return _NUMBERS[element]
+    return np.dtype(_NUMBERS[element])
 
 
 def _told(argument: Any) -> str:
