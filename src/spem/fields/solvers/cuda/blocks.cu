@@ -116,12 +116,16 @@ __device__ inline void project_tile(int tile, size_t system, const Real* const* 
     mix += system * n_blocks * LANES * width;
     for (int first = 0; first < width; first += LANES) {
         const Quad sum = mix_basis(blocks, n_blocks, mix, width, first, staged, row, half, {0.0, 0.0, 0.0, 0.0});
-        const double values[4] = {sum.x, sum.y, sum.z, sum.w};
         const int column = first + 4 * half;
+        T* const four = out + static_cast<size_t>(row) * width + column;
+        if (width % 4 == 0 && column < width) {
+            write(four, 0, 0, sum + read(constant + column, 0, 0));
+            continue;
+        }
+        const double values[4] = {sum.x, sum.y, sum.z, sum.w};
 #pragma unroll
         for (int j = 0; j < 4; j++)
-            if (column + j < width)
-                out[static_cast<size_t>(row) * width + column + j] = static_cast<T>(values[j] + constant[column + j]);
+            if (column + j < width) four[j] = static_cast<T>(values[j] + constant[column + j]);
     }
 }
 

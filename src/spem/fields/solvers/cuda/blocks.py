@@ -226,4 +226,4 @@ class Blocks:
 
     def _upload(self, values: Small) -> Array:
         """Small matrices on the device; None where there is nothing."""
-        return self.runtime.upload(np.ascontiguousarray(values)) if values.size else None
+        return self.runtime.upload(np.ascontiguousarray(values, np.float64)) if values.size else None
