@@ -38,7 +38,7 @@ FEW = 8
 RHO = 10.0
 # Figures are medians of some rounds; of large shapes, which take long, there is one.
 ROUNDS, LARGE = 3, 100_000
-ERROR_LIMIT = 1e-7
+ERROR_LIMIT = 1e-8
 ITERATED = "MultigridGradients"
 HORSES = {"horse, 15k": 15_000, "horse, 60k": 60_000, "horse, 250k": 250_000}
 BALLS = {"ball, 15k": 15_000, "ball, 60k": 60_000, "ball, 250k": 250_000}
