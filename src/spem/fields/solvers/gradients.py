@@ -27,9 +27,9 @@ class MultigridGradients:
     """Conjugate gradients with the V-cycle of the sweep as preconditioner, eight right-hand sides at a time.
 
     Iterations run in single precision; their sum is refined in double until the true residual is below the
-    tolerance. No memory but a few vectors is needed, and the time grows with the nodes, so it is for single
-    sources of shapes that are too large to factor, and for devices. Fields of single sources are right
-    relative to their maximum only: for logarithms, as parts need them, take `Direct`.
+    tolerance. It takes a few vectors of memory, and time in proportion to the nodes, so it is for sources of
+    shapes that are too large to factor, for few sources, and for devices. Fields of single sources are right
+    relative to their maximum only: logarithms, which parts are made of, are refused; take `Direct`.
 
     Parameters
     ----------
