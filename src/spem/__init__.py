@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from spem.fields.solvers.cuda.device import Cuda
     from spem.fields.solvers.direct import Direct
     from spem.fields.solvers.explicit import ExplicitIteration
+    from spem.fields.solvers.gradients import MultigridGradients
     from spem.fields.solvers.lanczos import BlockLanczos
     from spem.fields.solvers.protocol import Solution
     from spem.fields.solvers.sweep import Sweep
@@ -122,6 +123,7 @@ __all__ = [  # noqa: RUF022 - capitals first, as Python sorts, in all three list
     "MatchedParts",
     "Model",
     "ModelError",
+    "MultigridGradients",
     "NodalMoments",
     "NonnegativeSparseCoding",
     "ParameterError",
@@ -252,6 +254,7 @@ _HOME = {
     "MatchedParts": "spem.decomposition.matched",
     "Model": "spem.codes.model",
     "ModelError": "spem.errors",
+    "MultigridGradients": "spem.fields.solvers.gradients",
     "NodalMoments": "spem.codes.moments",
     "NonnegativeSparseCoding": "spem.decomposition.sparse_coding",
     "ParameterError": "spem.errors",
