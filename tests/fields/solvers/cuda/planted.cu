@@ -55,3 +55,28 @@ extern "C" __global__ void shifted_read(float* v, const float* w, int shift) {
 }
 
 extern "C" __global__ void through_table(float* const* table) { table[0][threadIdx.x] = 1; }
+
+extern "C" __global__ void warp_words(int* out) {
+    const unsigned all = 0xffffffffu;
+    const int thread = threadIdx.x, lane = thread % 32;
+    int* mine = out + 8 * thread;
+    mine[0] = __shfl_sync(all, thread, 3);
+    mine[1] = __shfl_xor_sync(all, thread, 5);
+    mine[2] = __shfl_up_sync(all, thread, 2);
+    mine[3] = __shfl_down_sync(all, thread, 2, 8);
+    mine[4] = (int)__ballot_sync(all, lane % 3 == 0);
+    mine[5] = __any_sync(all, thread == 40);
+    mine[6] = __all_sync(all, thread != 40);
+    __shared__ int next[THREADS];
+    next[thread] = thread;
+    __syncwarp();
+    mine[7] = next[thread ^ 1];
+}
+
+extern "C" __global__ void half_warp(int* out) {
+    if (threadIdx.x < 16) out[threadIdx.x] = __shfl_xor_sync(0x0000ffffu, (int)threadIdx.x, 1);
+}
+
+extern "C" __global__ void misaligned(float* v) {
+    if (threadIdx.x == 0) *reinterpret_cast<float4*>(v + 1) = make_float4(1, 2, 3, 4);
+}

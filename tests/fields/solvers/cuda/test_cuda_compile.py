@@ -77,6 +77,13 @@ def test_sources_compile_for_other_devices(source: str, architecture: int) -> No
 
 
 @compiles
+def test_the_planted_kernels_are_cuda() -> None:
+    """What the simulator is tested with compiles for a device too, and its kernels are parsed."""
+    text = read_source("common.cuh") + Path(__file__).with_name("planted.cu").read_text()
+    assert sorted(nvrtc.compile_kernels(text, (), 90)) == sorted(kernels(text))
+
+
+@compiles
 def test_what_is_refused_is_told() -> None:
     """The compiler's words, with the line of the file that is included, are in the error."""
     wrong = '#line 7 "wrong.cu"\nextern "C" __global__ void wrong(float* v) { v = 1; }'

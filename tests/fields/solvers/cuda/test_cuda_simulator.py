@@ -56,6 +56,28 @@ def test_sum_of_a_block(order: str) -> None:
     assert launch("count_threads", 5, np.zeros(1, np.int32), order=order).tolist() == [5 * THREADS]
 
 
+@pytest.mark.parametrize("order", ORDERS)
+def test_exchanges_of_a_warp(order: str) -> None:
+    """Shuffles, votes and the barrier of a warp are CUDA's."""
+    found = launch("warp_words", 1, np.zeros((THREADS, 8), np.int32), order=order)
+    thread = np.arange(THREADS)
+    lane, base = thread % 32, thread // 32 * 32
+    assert np.array_equal(found[:, 0], base + 3)
+    assert np.array_equal(found[:, 1], thread ^ 5)
+    assert np.array_equal(found[:, 2], np.where(lane < 2, thread, thread - 2))
+    assert np.array_equal(found[:, 3], np.where(lane % 8 > 5, thread, thread + 2))
+    assert np.array_equal(found[:, 4], np.full(THREADS, sum(1 << bit for bit in range(0, 32, 3))))
+    assert np.array_equal(found[:, 5], base == 32)
+    assert np.array_equal(found[:, 6], base != 32)
+    assert np.array_equal(found[:, 7], thread ^ 1)
+
+
+def test_parts_of_warps_are_refused() -> None:
+    """What is not simulated is said, not guessed."""
+    with pytest.raises(FaultError, match=r":\d+: a shuffle of a part of a warp is not simulated"):
+        launch("half_warp", 1, np.zeros(THREADS, np.int32))
+
+
 def test_orders_show_a_race() -> None:
     """A kernel that lacks a barrier answers differently in different orders; with it, it does not."""
     answers = {barrier: [launch("reverse", 1, np.zeros(THREADS, np.int32), np.int32(barrier), order=order)
@@ -227,23 +249,24 @@ import numpy as np
 from simulator import SimulatedRuntime
 
 runtime = SimulatedRuntime("shuffled", sanitize=True)
+program = runtime.compile(sys.argv[1])
 rows, sums = runtime.zeros((256, 8), np.float32), runtime.empty((2, 2, 8), np.float64)
-runtime.compile(sys.argv[1]).launch("reduce_tiles", 2, sums, rows)
-shift = np.int32(sys.argv[2])
-runtime.compile(sys.argv[1]).launch("shifted_read", 1, runtime.zeros(256, np.float32), rows[:32], shift)
+if sys.argv[2] == "misaligned":
+    program.launch("misaligned", 1, rows)
+program.launch("reduce_tiles", 2, sums, rows)
+program.launch("shifted_read", 1, runtime.zeros(256, np.float32), rows[:32], np.int32(sys.argv[2]))
 print(runtime.download(sums).sum())
 """
 
 
 @pytest.mark.skipif(find_sanitizer() is None, reason="g++ has no address sanitizer here")
-def test_sanitizers_find_reads_out_of_bounds() -> None:
-    """A kernel that keeps to its arrays runs under the sanitizers; one that reads past them is stopped."""
+def test_sanitizers_stop_what_a_device_would_not() -> None:
+    """A kernel that keeps to its arrays runs; a read past them, or across an alignment, is stopped."""
     good = spawn_sanitized("-c", SANITIZED, SOURCE, "0")
     assert (good.stdout.strip(), good.stderr) == ("0.0", "")
-    bad = spawn_sanitized("-c", SANITIZED, SOURCE, "2000")
-    assert re.search(
-        r"AddressSanitizer: use-after-poison.*READ of size 4.* in shifted_read ", bad.stderr, re.DOTALL
-    )
+    words = r"AddressSanitizer: use-after-poison.*READ of size 4.* in shifted_read "
+    assert re.search(words, spawn_sanitized("-c", SANITIZED, SOURCE, "2000").stderr, re.DOTALL)
+    assert "misaligned address" in spawn_sanitized("-c", SANITIZED, SOURCE, "misaligned").stderr
 
 
 def test_xp_has_only_what_cupy_has() -> None:
