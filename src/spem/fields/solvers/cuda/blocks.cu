@@ -107,17 +107,21 @@ extern "C" __global__ void __launch_bounds__(THREADS)
     write(block, row, half, mix_basis(blocks, n_blocks, own, LANES, 0, staged, row, half, sum));
 }
 
-// Rows of constant + B mix, of width columns, for one tile.
+// Rows of constant + B mix, of width columns, for one tile; row i is written as row place[i], unless that is
+// negative, or where it stands if there is no place.
 template <class T>
 __device__ inline void project_tile(int tile, size_t system, const Real* const* blocks, int n_blocks,
-                                    const double* constant, const double* mix, int width, double* staged, T* out) {
+                                    const double* constant, const double* mix, int width, const int* place,
+                                    double* staged, T* out) {
     const int row = tile_row(tile), half = half_row();
     constant += system * width;
     mix += system * n_blocks * LANES * width;
     for (int first = 0; first < width; first += LANES) {
         const Quad sum = mix_basis(blocks, n_blocks, mix, width, first, staged, row, half, {0.0, 0.0, 0.0, 0.0});
+        const int target = place ? place[row] : row;
+        if (target < 0) continue;
         const int column = first + 4 * half;
-        T* const four = out + static_cast<size_t>(row) * width + column;
+        T* const four = out + static_cast<size_t>(target) * width + column;
         if (width % 4 == 0 && column < width) {
             write(four, 0, 0, sum + read(constant + column, 0, 0));
             continue;
@@ -130,22 +134,23 @@ __device__ inline void project_tile(int tile, size_t system, const Real* const* 
 }
 
 // out = constant + B mix, with constant double[width] and mix double[K][width] of each system.
-// Bytes a row: LANES * sizeof(Real) for each block, from the cache after the first eight columns, and 4 width.
+// Bytes a row: LANES * sizeof(Real) for each block, from the cache after the first eight columns, 4 of place if
+// there is one, and 4 width.
 extern "C" __global__ void __launch_bounds__(THREADS)
     project_single(const int* tiles, const int* tile_system, const Real* const* blocks, int n_blocks,
-                   const double* constant, const double* mix, int width, float* out) {
+                   const double* constant, const double* mix, int width, const int* place, float* out) {
     alignas(16) __shared__ double staged[STAGED * SQUARE];
     const int tile = tiles[blockIdx.x];
-    project_tile(tile, tile_system[tile], blocks, n_blocks, constant, mix, width, staged, out);
+    project_tile(tile, tile_system[tile], blocks, n_blocks, constant, mix, width, place, staged, out);
 }
 
 // The same in double precision, 8 width.
 extern "C" __global__ void __launch_bounds__(THREADS)
     project_double(const int* tiles, const int* tile_system, const Real* const* blocks, int n_blocks,
-                   const double* constant, const double* mix, int width, double* out) {
+                   const double* constant, const double* mix, int width, const int* place, double* out) {
     alignas(16) __shared__ double staged[STAGED * SQUARE];
     const int tile = tiles[blockIdx.x];
-    project_tile(tile, tile_system[tile], blocks, n_blocks, constant, mix, width, staged, out);
+    project_tile(tile, tile_system[tile], blocks, n_blocks, constant, mix, width, place, staged, out);
 }
 
 // r = s M (1 - u) - A u, with s double[LANES] of each system.

@@ -81,7 +81,7 @@ class Blocks:
     def __init__(self, hierarchy: Hierarchy, dtype: type[np.floating[Any]], runtime: Runtime) -> None:
         level = hierarchy.levels[0]
         self.dtype, self.runtime, self.exact = np.dtype(dtype), runtime, hierarchy.exact
-        self.layout, self.neighbours = level.layout, level.neighbours
+        self.layout, self.neighbours, self._rows = level.layout, level.neighbours, hierarchy.rows
         self._program = runtime.program(
             "blocks.cu", DIM=level.neighbours.shape[1] // 2, WIDE=int(self.dtype == np.float64)
         )
@@ -161,7 +161,7 @@ class Blocks:
         gram, stiffness, mass = (parts[:, :, k].reshape(len(found), -1, LANES) for k in range(3))
         return Products(gram, stiffness, mass, sums[:, :LANES], sums[:, LANES:])
 
-    def project(self, constant: Small, mix: Small, dtype: Any = np.float32) -> Array:
+    def project(self, constant: Small, mix: Small) -> Array:
         """Make constant + B·mix of all systems, on the device.
 
         Parameters
@@ -170,20 +170,37 @@ class Blocks:
             ``(n_systems, k)``.
         mix
             ``(n_systems, K, k)``.
-        dtype
-            Precision of the answer.
 
         Returns
         -------
-        ``(n_rows, k)`` in `dtype`; padding rows hold the constant.
+        ``(n_rows, k)`` float32; padding rows hold the constant.
         """
-        width = mix.shape[2]
-        out = self.runtime.empty((self.layout.n_rows, width), dtype)
-        if width == 0:
+        return self._project(
+            constant, mix, self.runtime.empty((self.layout.n_rows, mix.shape[2]), np.float32)
+        )
+
+    def columns(self, mix: Small) -> Array:
+        """Make B·mix of all systems in the order of nodes, ``(n_nodes, k)``, in the precision of the basis.
+
+        Parameters
+        ----------
+        mix
+            ``(n_systems, K, k)``.
+        """
+        n_nodes, runtime = self._rows.size, self.runtime
+        place = runtime.empty((self.layout.n_rows,), np.int32)
+        place[...] = -1
+        place[self._rows] = runtime.xp.arange(n_nodes, dtype=np.int32)
+        out = runtime.empty((n_nodes, mix.shape[2]), self.dtype)
+        return self._project(np.zeros((len(mix), mix.shape[2])), mix, out, place)
+
+    def _project(self, constant: Small, mix: Small, out: Array, place: Array = None) -> Array:
+        """Write constant + B·mix, each row where its place is."""
+        if mix.shape[2] == 0:
             return out
-        kernel = "project_double" if np.dtype(dtype) == np.float64 else "project_single"
-        mixes = self._upload(constant), self._upload(mix)
-        tables = self.every_tile, self.layout.tile_system, *self._basis, *mixes, np.int32(width), out
+        kernel = "project_double" if out.dtype == np.float64 else "project_single"
+        mixes = self._upload(constant), self._upload(mix), np.int32(mix.shape[2])
+        tables = self.every_tile, self.layout.tile_system, *self._basis, *mixes, place, out
         self._program.launch(kernel, self.every_tile.size, *tables)
         return out
 

@@ -145,8 +145,13 @@ class CudaEngine:
         mix = np.zeros((len(turn), turn[0].shape[0], max(ranks)))
         for whole, part in zip(mix, turn, strict=True):
             whole[:, : part.shape[1]] = part
-        values = self.to_nodes(self._project(np.zeros((len(turn), max(ranks))), mix, self.dtype))
-        return [np.ascontiguousarray(part[:, :rank]) for part, rank in zip(values, ranks, strict=True)]
+        n_nodes, size = int(self.counts.sum()), self._width * max(ranks)
+        with self._stage("project", n_nodes * (self._basis_bytes + size)):
+            table = self._open.blocks.columns(mix)
+        with self._stage("transfers", n_nodes * size):
+            values = self.runtime.download(table)
+        parts = zip(self._split(values), ranks, strict=True)
+        return [np.ascontiguousarray(part[:, :rank]) for part, rank in parts]
 
     def project(self, constant: Small, mix: Small) -> Array:
         """Make constant + B·mix on the device: fields, or maps.
@@ -163,17 +168,15 @@ class CudaEngine:
         ``(n_rows, k)`` float32 on the device, which `to_nodes` brings to the host. Padding rows hold the
         constant.
         """
-        return self._project(constant, mix, np.float32)
+        with self._stage("project", int(self.counts.sum()) * (self._basis_bytes + 4 * mix.shape[2])):
+            return self._open.blocks.project(constant, mix)
 
     def to_nodes(self, table: Array) -> list[NDArray[Any]]:
         """Bring a table of rows to the host in one transfer: each system's ``(n_nodes, k)``, by node."""
         rows = self._open.hierarchy.rows
         with self._stage("transfers", 3 * table.dtype.itemsize * rows.size * table.shape[1]):
             values = self.runtime.download(table[rows])
-        if self.counts.size == 1:
-            return [values]
-        # Copies, so that one of them does not keep the others in memory.
-        return [part.copy() for part in np.split(values, np.cumsum(self.counts[:-1]))]
+        return self._split(values)
 
     def load(self, rhs: Sequence[NDArray[np.float64]]) -> Small:
         """Take right-hand sides and return b·b."""
@@ -248,11 +251,11 @@ class CudaEngine:
     def _count_cycle(self) -> None:
         self._meter.count("cycle", self._share * self._cycle_bytes)
 
-    def _project(self, constant: Small, mix: Small, dtype: type[np.floating[Any]]) -> Array:
-        work = self._open
-        width = np.dtype(dtype).itemsize * mix.shape[2]
-        with self._stage("project", int(self.counts.sum()) * (self._basis_bytes + width)):
-            return work.blocks.project(constant, mix, dtype)
+    def _split(self, values: NDArray[Any]) -> list[NDArray[Any]]:
+        """Part the values of all nodes: copies, so that one does not keep the others in memory."""
+        if self.counts.size == 1:
+            return [values]
+        return [part.copy() for part in np.split(values, np.cumsum(self.counts[:-1]))]
 
     @property
     def _share(self) -> int:
@@ -276,6 +279,8 @@ class CudaEngine:
     @contextmanager
     def _stage(self, name: str, n_bytes: float = 0) -> Iterator[None]:
         """Time and count what is done within; a device out of memory gives back what it has."""
+        # Asking for the array functions makes the device this thread's.
+        _ = self.runtime.xp
         try:
             with self._meter.stage(name, n_bytes):
                 yield
