@@ -68,10 +68,10 @@ class Processor:
 
 
 class Device:
-    """A CUDA device, by its runtime."""
+    """A CUDA device, by its runtime; the versions of what runs it are told with its name."""
 
-    def __init__(self, runtime: Any) -> None:
-        self.runtime = runtime
+    def __init__(self, runtime: Any, versions: str = "") -> None:
+        self.runtime, self.versions = runtime, versions
         self.name = f"GPU ({runtime.name})"
 
     def backend(self, *, profile: bool) -> Backend:
@@ -132,9 +132,12 @@ Side = Processor | Device
 def find_device() -> tuple[Device | None, str]:
     """Return the first CUDA device, or None and the reason."""
     try:
-        return Device(Cuda().runtime()), ""
+        runtime = Cuda().runtime()
     except SpemError as error:
         return None, str(error)
+    cupy = runtime.xp
+    driver, built = cupy.cuda.runtime.driverGetVersion(), cupy.cuda.runtime.runtimeGetVersion()
+    return Device(runtime, f"CuPy {cupy.__version__} for CUDA {built}, driver for CUDA {driver}"), ""
 
 
 def mixes(batch: Batch) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
@@ -181,8 +184,10 @@ def measure(
     row: Row = {"side": side.name, "nodes": inputs[0][0].n_nodes, "rho": n_rho, "batch": count}
     row |= {"runs": len(runs), "seconds": middle, "ms a shape": 1e3 * middle / count}
     row["microseconds a node"] = 1e6 * middle / sum(shape.n_nodes for shape in inputs[0])
-    for stage in (*STAGES, "host algebra, maps"):
+    for stage in (*STAGES, *(["host algebra, maps"] if isinstance(side, Device) else [])):
         row[stage] = median_of(lambda each, stage=stage: each.clock.seconds[stage], runs)
+    if isinstance(side, Device):
+        row["download of all"] = run(side, inputs[0], n_rho, fetch=True).clock.seconds["download"]
     row |= {"iterations": runs[-1].iterations, "rank": runs[-1].rank}
     return row
 
