@@ -50,7 +50,9 @@ def compile_kernels(text: str, options: Sequence[str], architecture: int) -> dic
     assert library is not None
     program = ctypes.c_void_p()
     library.nvrtcCreateProgram(ctypes.byref(program), text.encode(), b"source.cu", 0, None, None)
-    flags = [f"-arch=sm_{architecture}", "-std=c++17", "--ptxas-options=-v", *options]
+    # What CuPy adds to its users' options, and a report of ptxas.
+    cupys = ["-ftz=true", "--device-as-default-execution-space", f"-arch=sm_{architecture}"]
+    flags = ["-std=c++17", *options, *cupys, "--ptxas-options=-v"]
     words = (ctypes.c_char_p * len(flags))(*(flag.encode() for flag in flags))
     status = library.nvrtcCompileProgram(program, len(flags), words)
     size = ctypes.c_size_t()

@@ -15,12 +15,13 @@ from spem.fields.solvers.cuda.runtime import THREADS
 # What the runtime takes of CuPy.
 USED = """
 RawModule.get_function ndarray.get ndarray.data get_default_memory_pool
-get_default_pinned_memory_pool asarray zeros empty cuda.Device.use cuda.Device.mem_info
-cuda.Device.synchronize cuda.Event.record cuda.Event.synchronize cuda.get_elapsed_time
-cuda.MemoryPool.get_limit cuda.MemoryPool.used_bytes cuda.MemoryPool.free_bytes
-cuda.MemoryPool.free_all_blocks cuda.PinnedMemoryPool.free_all_blocks cuda.MemoryPointer.ptr
-cuda.driver.CUDADriverError cuda.runtime.CUDARuntimeError cuda.runtime.driverGetVersion
-cuda.runtime.runtimeGetVersion cuda.runtime.getDeviceCount cuda.runtime.getDeviceProperties
+get_default_pinned_memory_pool asarray zeros empty cuda.Device.use cuda.Device.id
+cuda.Device.mem_info cuda.Device.synchronize cuda.Event.record cuda.Event.synchronize
+cuda.get_elapsed_time cuda.MemoryPool.get_limit cuda.MemoryPool.used_bytes
+cuda.MemoryPool.free_bytes cuda.MemoryPool.free_all_blocks cuda.PinnedMemoryPool.free_all_blocks
+cuda.MemoryPointer.ptr cuda.driver.CUDADriverError cuda.runtime.CUDARuntimeError
+cuda.runtime.driverGetVersion cuda.runtime.runtimeGetVersion cuda.runtime.getDeviceCount
+cuda.runtime.getDeviceProperties
 """
 
 
@@ -62,7 +63,8 @@ def program() -> tuple[CupyProgram, Module]:
 
     driver = SimpleNamespace(CUDADriverError=FakeDriverError)
     cupy = SimpleNamespace(RawModule=compile_module, cuda=SimpleNamespace(driver=driver))
-    return CupyProgram(cupy, "krylov.cu", ("-DDIM=2",)), made[0]
+    device = SimpleNamespace(use=lambda: None)
+    return CupyProgram(cupy, device, "krylov.cu", ("-DDIM=2",)), made[0]
 
 
 def arguments_of(program: CupyProgram, kernel: str) -> list[Any]:

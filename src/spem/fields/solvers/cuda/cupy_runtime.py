@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from spem.errors import MissingExtraError, ParameterError
-from spem.fields.solvers.cuda.programs import Kernel, kernels, options, read_source
+from spem.fields.solvers.cuda.programs import kernels, options, read_source
 from spem.fields.solvers.cuda.runtime import THREADS, Array
 
 # cudaErrorMemoryAllocation and CUDA_ERROR_OUT_OF_MEMORY
@@ -64,45 +64,51 @@ def require_device(driver: Any, index: int) -> None:
 
 
 class CupyProgram:
-    """A source compiled by CuPy, for whichever device is current.
+    """A source compiled by CuPy for a device, when a kernel of it is first launched.
 
     Parameters
     ----------
     cupy
         The module.
+    device
+        Its device.
     source
         Name of the source.
     settings
         The compiler's options for macros.
     """
 
-    def __init__(self, cupy: Any, source: str, settings: tuple[str, ...]) -> None:
+    def __init__(self, cupy: Any, device: Any, source: str, settings: tuple[str, ...]) -> None:
         text = read_source(source)
-        self._cupy, self._source = cupy, source
+        self._cupy, self._device, self._source = cupy, device, source
         self._kernels = kernels(text)
         self._module = cupy.RawModule(code=text, options=("-std=c++17", *settings), backend="nvrtc")
-        self._functions: dict[str, tuple[Kernel, Any]] = {}
+        self._functions: dict[str, Any] = {}
 
     def launch(self, kernel: str, n_blocks: int, *arguments: Any) -> None:
         """Run a kernel, see `spem.fields.solvers.cuda.runtime.Program`."""
-        if kernel not in self._functions:
-            if kernel not in self._kernels:
-                msg = f"{self._source} has no kernel {kernel}; it has {', '.join(self._kernels)}"
-                raise TypeError(msg)
-            self._functions[kernel] = (self._kernels[kernel], self._module.get_function(kernel))
-        known, function = self._functions[kernel]
-        known.check(arguments)
+        if kernel not in self._kernels:
+            msg = f"{self._source} has no kernel {kernel}; it has {', '.join(self._kernels)}"
+            raise TypeError(msg)
+        self._kernels[kernel].check(arguments)
         if n_blocks == 0:
             return
         # CuPy passes None as no argument at all, which the driver reads; the null pointer is a number.
         passed = tuple(np.int64(0) if argument is None else argument for argument in arguments)
+        self._device.use()
         try:
-            function((int(n_blocks),), (THREADS,), passed)
+            self._function(kernel)((int(n_blocks),), (THREADS,), passed)
         except self._cupy.cuda.driver.CUDADriverError as error:
             if error.status != _OUT_OF_MEMORY:
                 raise
             msg = f"no memory left to launch {kernel}"
             raise MemoryError(msg) from error
+
+    def _function(self, kernel: str) -> Any:
+        """Kernel as CuPy has it."""
+        if kernel not in self._functions:
+            self._functions[kernel] = self._module.get_function(kernel)
+        return self._functions[kernel]
 
 
 class CupyRuntime:
@@ -140,8 +146,7 @@ class CupyRuntime:
 
     def program(self, source: str, **macros: int) -> CupyProgram:
         """Compile a source, or find it compiled."""
-        self._device.use()
-        return _program(source, options(macros))
+        return _program(int(self._device.id), source, options(macros))
 
     def upload(self, values: NDArray[Any]) -> Array:
         """Copy to the device, by way of page-locked memory that CuPy keeps for it."""
@@ -193,6 +198,7 @@ class CupyRuntime:
 
 
 @cache
-def _program(source: str, settings: tuple[str, ...]) -> CupyProgram:
-    """Compile a source once."""
-    return CupyProgram(import_module("cupy"), source, settings)
+def _program(index: int, source: str, settings: tuple[str, ...]) -> CupyProgram:
+    """Make a program once for each device."""
+    cupy = import_module("cupy")
+    return CupyProgram(cupy, cupy.cuda.Device(index), source, settings)
