@@ -93,7 +93,7 @@ def batch_features(batch: Batch, settings: Settings, kept: Sequence[Kept]) -> li
             engine.to_nodes(project_maps(batch, settings, band)) for band in range(len(settings.rho_ranges))
         ]
     return [
-        tuple(np.ascontiguousarray(maps[keep], np.float32) for maps in shape)
+        tuple(np.ascontiguousarray(maps if keep.all() else maps[keep], np.float32) for maps in shape)
         for *shape, keep in zip(*bands, kept, strict=True)
     ]
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 from spem.codes.batches import BATCH_NODES
@@ -16,6 +18,7 @@ from spem.codes.work import Entry, Work, dimension
 from spem.codes.workers import run_all
 from spem.errors import ShapeError, SpemError
 from spem.fields.solvers.engine import Backend
+from spem.fields.solvers.team import usable_threads
 
 # Called with the hash of a source that is done, and its dimension.
 Done = Callable[[str, int], None]
@@ -48,7 +51,8 @@ class _Task:
         waiting = [draft.shape.n_nodes for draft in drafts if draft.shape is not None]
         if not waiting:
             entries = [entry_of(draft, self.model) for draft in drafts]
-            _require_whole(entries)
+            if reason := _reason(entries):
+                raise ShapeError(reason)
             self.folder.save(key, entries)
         return _Drafted(max((draft.ndim for draft in drafts), default=0), sum(waiting))
 
@@ -116,26 +120,26 @@ class DeviceWork:
         self._finish(list(waiting), listing, done)
 
     def _finish(self, keys: Sequence[str], listing: Listing, done: Done) -> None:
-        """Turn drafts of sources into entries."""
-        drafts = [(key, each) for key in keys for each in load_drafts(self.folder, key)]
-        finished = finish_drafts([draft for _, draft in drafts], self.settings, self.model, self.device)
-        entries: dict[str, list[Entry]] = {key: [] for key in keys}
-        for (key, _), entry in zip(drafts, finished, strict=True):
-            entries[key].append(entry)
-        for key, each in entries.items():
-            try:
-                _require_whole(each)
-            except SpemError as error:
-                listing.fail(listing.first[key], str(error), key)
-                done(key, 0)
-            else:
-                self.folder.save(key, each)
-                done(key, dimension(each))
-            drop_drafts(self.folder, key)
+        """Turn drafts of sources into entries; files are read and written by threads, which hash them too."""
+        with ThreadPoolExecutor(usable_threads()) as pool:
+            loaded = list(pool.map(partial(load_drafts, self.folder), keys))
+            drafts = [draft for each in loaded for draft in each]
+            finished = iter(finish_drafts(drafts, self.settings, self.model, self.device))
+            entries = [[next(finished) for _ in each] for each in loaded]
+            for key, each, reason in zip(keys, entries, pool.map(self._save, keys, entries), strict=True):
+                if reason:
+                    listing.fail(listing.first[key], reason, key)
+                done(key, 0 if reason else dimension(each))
+
+    def _save(self, key: str, entries: list[Entry]) -> str:
+        """Write the entries of a source in place of its drafts, and return why there are none, if so."""
+        reason = _reason(entries)
+        if not reason:
+            self.folder.save(key, entries)
+        drop_drafts(self.folder, key)
+        return reason
 
 
-def _require_whole(entries: Sequence[Entry]) -> None:
-    """Raise the reason why the only shape of a source gave nothing; one of several labels stays an entry."""
-    for entry in entries:
-        if entry.reason and not entry.suffix:
-            raise ShapeError(entry.reason)
+def _reason(entries: Sequence[Entry]) -> str:
+    """Return why the only shape of a source gave nothing, if so; one of several labels stays an entry."""
+    return next((entry.reason for entry in entries if entry.reason and not entry.suffix), "")
