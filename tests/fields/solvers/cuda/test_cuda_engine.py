@@ -15,7 +15,7 @@ from spem.errors import ParameterError, SizeError
 from spem.fields.operator import System, assemble
 from spem.fields.solvers.cuda.cycle import cycle_bytes
 from spem.fields.solvers.cuda.engine import CudaEngine
-from spem.fields.solvers.cuda.workspace import engine_bytes, require_numbers
+from spem.fields.solvers.cuda.workspace import engine_bytes, require_batch
 from spem.fields.solvers.engine import LANES, Small, SourceEngine
 from spem.fields.solvers.host import HostEngine
 from spem.fields.solvers.sweep import Sweep
@@ -84,9 +84,12 @@ def two_blocks(engine: SourceEngine) -> list[Any]:
     return [*answers, *engine.columns(turn)]
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_answers_are_those_of_the_host(systems: tuple[System, ...], dtype: Any) -> None:
+@pytest.mark.parametrize(
+    ("name", "dtype"), [("1-D", np.float64), ("2-D", np.float32), ("3-D", np.float64), ("4-D", np.float32)]
+)
+def test_answers_are_those_of_the_host(name: str, dtype: Any) -> None:
     """Solutions, products and columns agree with the host's to the accuracy of the solves."""
+    systems = BATCHES[name]
     engine = CudaEngine(systems, dtype, SimulatedRuntime())
     host = HostEngine(systems, dtype)
     assert engine.counts.tolist() == host.counts.tolist()
@@ -254,9 +257,9 @@ def test_too_large_a_batch_is_refused_before_anything_is_allocated() -> None:
     expected = Sweep(device=Simulated()).hyperfields(systems, [RHO] * 3)
     for one, other in zip(fields, expected, strict=True):
         assert np.array_equal(one.basis, other.basis)
-    assert require_numbers([systems[0]] * 1000) is None
+    assert require_batch([systems[0]] * 1000) is None
     with pytest.raises(SizeError, match=r"1200000 shapes of 320,400,000 nodes: .* at most 536,870,912 "):
-        require_numbers([systems[0]] * 1_200_000)
+        require_batch([systems[0]] * 1_200_000)
 
 
 def test_the_estimate_of_memory_is_close() -> None:
@@ -281,3 +284,10 @@ def test_a_closed_engine_says_so() -> None:
     for ask in (lambda: engine.hierarchy, engine.overlaps, lambda: engine.select(np.ones(3, bool))):
         with pytest.raises(ParameterError, match="this engine is closed"):
             ask()
+
+
+def test_batches_of_several_dimensions_are_refused() -> None:
+    """Systems of different dimensions do not go together, and none is no batch."""
+    for systems in ((), (BATCHES["1-D"][0], BATCHES["2-D"][0])):
+        with pytest.raises(ParameterError, match="expected shapes, all of one dimension"):
+            CudaEngine(systems, np.float32, SimulatedRuntime())

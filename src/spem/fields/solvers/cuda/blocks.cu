@@ -326,6 +326,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 4)
     for (int tile = chunk.first_tile; tile < chunk.end_tile; tile++) {
         const int row = tile_row(tile);
         const Quad here = read(c, row, half);
+        // one axis at a time, or registers run out
         const Quad product = multiply<1>(neighbours, weights, diagonal[row], c, row, half, here);
         __syncthreads();
         write(rows.x, own, half, here);

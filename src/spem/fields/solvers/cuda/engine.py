@@ -23,7 +23,7 @@ from spem.fields.solvers.cuda.workspace import (
     Sources,
     Workspace,
     engine_bytes,
-    require_numbers,
+    require_batch,
     told,
 )
 from spem.fields.solvers.engine import LANES, Products, Small
@@ -57,6 +57,8 @@ class CudaEngine:
 
     Raises
     ------
+    ParameterError
+        When there is no system, or they differ in dimension.
     SizeError
         When the systems do not fit into the memory of the device; in any method, too.
     """
@@ -69,6 +71,7 @@ class CudaEngine:
         *,
         profile: bool = False,
     ) -> None:
+        require_batch(systems)
         self.runtime, self.dtype = runtime, dtype
         self.counts = np.array([system.n_nodes for system in systems], np.int64)
         self.units = np.array([min(system.shape.spacing) for system in systems])
@@ -77,7 +80,6 @@ class CudaEngine:
         self._workspace: Workspace | None = None
         self._sources: Sources | None = None
         self._active = np.ones(len(systems), bool)
-        require_numbers(systems)
         self._bytes_with = partial(engine_bytes, systems, dtype)
         self._free = runtime.free_bytes()
         if self._bytes_with(EXPECTED_BLOCKS) > self._free:
@@ -109,7 +111,7 @@ class CudaEngine:
         """Narrow or widen the active systems."""
         with self._stage("krylov"):
             self._open.krylov.select(active)
-            self._active = active
+            self._active = active.copy()
 
     def search(self, beta: Small | None) -> Small:
         """Turn p, set q and return p·q."""
@@ -239,9 +241,9 @@ class CudaEngine:
         work = self._open
         with self._stage("krylov"):
             work.krylov.finish()
-            self._active = active
-            if active is not work.blocks.active:
-                work.blocks.select(active)
+            self._active = active.copy()
+            if not np.array_equal(active, work.blocks.active):
+                work.blocks.select(self._active)
         return work
 
     def _precondition(self) -> Small:

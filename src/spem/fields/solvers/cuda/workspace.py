@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import SizeError
+from spem.errors import ParameterError, SizeError
 from spem.fields.operator import System
 from spem.fields.solvers.cuda.blocks import Blocks
 from spem.fields.solvers.cuda.cycle import Cycle
@@ -116,9 +116,13 @@ def count_rows(counts: Sequence[int] | NDArray[np.int64]) -> int:
     return int(np.sum(np.asarray(counts, np.int64) + 2 * (TILE - 1)))
 
 
-def require_numbers(systems: Sequence[System]) -> None:
-    """Refuse more rows than kernels can number."""
-    d, n_nodes = systems[0].shape.ndim, sum(system.n_nodes for system in systems)
+def require_batch(systems: Sequence[System]) -> None:
+    """Refuse what no batch can be made of, and more rows than kernels can number."""
+    dimensions = sorted({system.shape.ndim for system in systems})
+    if len(dimensions) != 1:
+        msg = f"a batch of shapes of dimensions {dimensions}: expected shapes, all of one dimension"
+        raise ParameterError(msg)
+    d, n_nodes = dimensions[0], sum(system.n_nodes for system in systems)
     most = _MOST_ENTRIES // max(2 * d, 2**d)
     if count_rows([system.n_nodes for system in systems]) >= most:
         msg = (
