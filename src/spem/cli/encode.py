@@ -66,6 +66,7 @@ def encode(
       spem encode shapes/ -o maps.spem --features spem
       spem encode seg.nii.gz -o objects.spem --per-label
       spem encode more/ -o shapes.spem                      adds to shapes.spem
+      spem encode solids/ -o solids.spem --device cuda      maps on a GPU
     """  # noqa: D301
     from spem.codes.settings import Settings
 
