@@ -244,6 +244,21 @@ def test_other_dimensions_are_refused(model: Model) -> None:
         encode_shapes([spem.synthetic.ball(1.0, 0.3)], model, device=Host())
 
 
+def test_shapes_of_several_dimensions_are_refused(shapes: list[Shape]) -> None:
+    """A batch is of one dimension."""
+    with pytest.raises(ParameterError, match="shapes of dimensions 2, 3; give shapes of one dimension"):
+        features_of([shapes[0], spem.synthetic.ball(1.0, 0.3)], SETTINGS, device=Host())
+
+
+def test_maps_of_an_interval() -> None:
+    """Shapes of one dimension have the maps of the host."""
+    shape = spem.synthetic.interval(1.0, 0.01)
+    [[host]], [[device]] = (
+        features_of([shape], SETTINGS, device=each, rtol=TIGHT) for each in (Host(), Simulated())
+    )
+    assert np.abs(host - device).max() < 1e-5 * np.abs(host).max()
+
+
 def test_no_shapes_have_no_codes(model: Model) -> None:
     """Nothing in, nothing out."""
     assert encode_shapes([], model, device=Host()).shape == (0, model.n_code)

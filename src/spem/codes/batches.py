@@ -17,7 +17,7 @@ from spem.codes.model import Model
 from spem.codes.part import Part
 from spem.codes.settings import Settings
 from spem.codes.word_sums import Kept
-from spem.errors import MissingExtraError, SpemError
+from spem.errors import MissingExtraError, ParameterError, SpemError
 from spem.fields.operator import System, assemble
 from spem.fields.solvers.batch import Batch
 from spem.fields.solvers.cuda.device import Cuda
@@ -162,6 +162,8 @@ def features_of(
     ------
     SizeError
         When a single shape does not fit into the memory of the device.
+    ParameterError
+        When the shapes are of several dimensions.
     SpemError
         When a shape has no features.
 
@@ -234,6 +236,12 @@ def _swept(
     shapes: Sequence[Shape], settings: Settings, sweep: Sweep, make: Make[T], max_nodes: int
 ) -> Iterator[T | SpemError]:
     """Yield for each shape what is made of its sweep, or why there is nothing."""
+    dimensions = sorted({shape.ndim for shape in shapes})
+    if len(dimensions) > 1:
+        msg = (
+            f"shapes of dimensions {', '.join(map(str, dimensions))}; give shapes of one dimension at a time"
+        )
+        raise ParameterError(msg)
     plan = batches([shape.n_nodes for shape in shapes], max_nodes)
 
     def prepare(places: range) -> list[_Ready | SpemError]:
