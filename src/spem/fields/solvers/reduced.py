@@ -65,7 +65,7 @@ class ReducedBases:
         turned = half @ self.stiffness @ half.transpose(0, 2, 1)
         # what stands for a column of zeros is above all others
         top = 2 * np.abs(turned).sum(axis=(1, 2))[:, None] + 1.0
-        turned[:, *np.diag_indices(turned.shape[1])] += np.where(self.used, 0.0, top)
+        turned += np.where(self.used, 0.0, top)[:, None] * np.eye(turned.shape[1])
         return np.asarray(np.linalg.eigvalsh(turned)[:, 0])
 
     def extend(self, active: NDArray[np.bool_]) -> None:
@@ -110,9 +110,7 @@ class ReducedBases:
 
     def _filled(self, matrix: Small) -> Small:
         """Put ones on the diagonal for columns of zeros."""
-        filled = matrix.copy()
-        filled[:, *np.diag_indices(matrix.shape[1])] += ~self.used
-        return filled
+        return np.asarray(matrix + ~self.used[:, None] * np.eye(matrix.shape[1]))
 
 
 def _galerkin(stiffness: Small, mass: Small, source: Small, shifts: Small) -> Small:
