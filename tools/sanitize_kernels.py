@@ -1,4 +1,4 @@
-"""Run sweeps of small shapes under the address and undefined-behaviour sanitizers of g++, in the simulator.
+"""Run sweeps and codes of small shapes in the simulator under g++'s sanitizers of addresses and behaviour.
 
 A read or write outside an array, or a barrier that some threads do not reach, ends it with the line of the
 kernel. Needs g++ on x86-64; takes a minute.
@@ -12,22 +12,30 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "support"))
 
-#: The sweep is compared with the host's to this share of the largest value.
-TOLERANCE = 1e-5
+#: Fields and codes are compared with the host's to this share of the largest value.
+TOLERANCE = 1e-4
 
 PROGRAM = """
 import sys
 import numpy as np
 import spem
 from simulator import Simulated
+from spem.codes.batches import encode_shapes
+from spem.fields.solvers.host import Host
 
-device = Simulated("shuffled", sanitize=True)
-for shape in (spem.synthetic.disk(14.0, 1.0), spem.synthetic.ball(6.0, 1.0)):
-    found, wanted = (spem.sweep(shape, n_rho=16, device=one).fields() for one in (device, None))
+def compare(what, found, wanted):
     error = np.abs(found - wanted).max() / np.abs(wanted).max()
-    print(f"{shape}: {error:.1e} from the host's", flush=True)
+    print(f"{what}: {error:.1e} from the host's", flush=True)
     if error > float(sys.argv[1]):
         sys.exit(1)
+
+device = Simulated("shuffled", sanitize=True)
+disks = [spem.synthetic.disk(radius, 1.0) for radius in (14.0, 40.0)]
+for shape in (*disks, spem.synthetic.ball(6.0, 1.0)):
+    compare(shape, *(spem.sweep(shape, n_rho=16, device=one).fields() for one in (device, None)))
+model = spem.encode(disks, features="spem", n_rho=16, n_centers=4).model
+codes = [encode_shapes(disks, model, device=one, rtol=1e-9) for one in (device, Host())]
+compare("codes", *codes)
 """
 
 

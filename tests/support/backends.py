@@ -31,7 +31,7 @@ def use_backend(name: str) -> Backend | None:
 def missing(name: str) -> str | None:
     """Return why a backend cannot run here; None when it can."""
     if name == "simulated" and find_compiler() is None:
-        return "the simulator needs g++ or clang++"
+        return "the simulator needs g++ or clang++ on Linux"
     if name == "cuda":
         try:
             Cuda().runtime()

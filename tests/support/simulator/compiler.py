@@ -19,6 +19,7 @@ from pathlib import Path
 from spem.fields.solvers.cuda.programs import Kernel, kernels, options
 
 SHIM = Path(__file__).with_name("simulator.h")
+HEADERS = (SHIM, SHIM.with_name("words.h"))
 SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", "-g")
 
 
@@ -39,14 +40,14 @@ class Library:
 
 
 def find_compiler() -> str | None:
-    """Return the C++ compiler, if there is one."""
-    return shutil.which("g++") or shutil.which("clang++")
+    """Return the C++ compiler, if there is one; sections of shared memory are Linux's."""
+    return (shutil.which("g++") or shutil.which("clang++")) if sys.platform == "linux" else None
 
 
 def find_sanitizer() -> str | None:
     """Return the library of g++'s address sanitizer, if there is one."""
     compiler = shutil.which("g++")
-    if compiler is None or platform.machine() != "x86_64":
+    if compiler is None or sys.platform != "linux" or platform.machine() != "x86_64":
         return None
     library = _call([compiler, "-print-file-name=libasan.so"], "").strip()
     return library if Path(library).is_file() else None
@@ -72,7 +73,7 @@ def _build(text: str, macros: tuple[tuple[str, int], ...], sanitize: bool) -> Li
     """Compile a source: first its macros, for the kernels' true parameters, then kernels and launchers."""
     compiler = find_compiler()
     if compiler is None:
-        msg = "the simulator needs g++ or clang++; neither is on the PATH"
+        msg = "the simulator needs g++ or clang++ on Linux"
         raise RuntimeError(msg)
     plain = _call([compiler, "-E", "-x", "c++", *options(dict(macros)), "-"], text)
     found = kernels("\n".join(line for line in plain.splitlines() if not line.startswith("#")))
@@ -85,7 +86,9 @@ def _build(text: str, macros: tuple[tuple[str, int], ...], sanitize: bool) -> Li
     body = f'#include "{SHIM}"\nnamespace {{\n{plain}\n}}\n{launchers}'
     flags = ["-std=c++17", "-O2", "-shared", "-fPIC", "-U_FORTIFY_SOURCE", "-ffp-contract=off", "-w"]
     command = [compiler, *flags, *(SANITIZE if sanitize else ()), "-x", "c++", "-"]
-    key = hashlib.sha256("\0".join((*command, SHIM.read_text(), body)).encode()).hexdigest()[:32]
+    key = hashlib.sha256(
+        "\0".join((*command, *(path.read_text() for path in HEADERS), body)).encode()
+    ).hexdigest()[:32]
     target = _folder() / f"{key}.so"
     if not target.exists():
         part = target.with_suffix(f".{os.getpid()}")

@@ -15,7 +15,7 @@ from spem.fields.solvers.cuda.programs import kernels, read_source
 from spem.fields.solvers.cuda.runtime import THREADS, TILE, Runtime
 from spem.fields.solvers.engine import LANES
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="the simulator needs g++ or clang++")
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="the simulator needs g++ or clang++ on Linux")
 
 ZEROS = np.zeros(THREADS, np.float32)
 ORDERS = ("forward", "backward", "shuffled")
