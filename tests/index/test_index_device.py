@@ -14,6 +14,7 @@ from simulator import Simulated
 
 from spem.errors import ParameterError, SizeError
 from spem.fields.operator import System
+from spem.fields.solvers.cuda.device import Cuda
 from spem.fields.solvers.host import Host, HostEngine
 from spem.index.index import Index
 from spem.shapes.shape import Shape
@@ -116,3 +117,17 @@ def test_cluster_and_device_exclude_each_other(folder, tmp_path):
     """Workers of a cluster have no share in a device of this machine."""
     with pytest.raises(ParameterError, match="exclude each other; give one of them"):
         Index.open(tmp_path / "a.db").add(folder, cluster="tcp://nowhere:1", device=Host())
+
+
+def test_missing_device_is_told_before_anything_is_read(folder, tmp_path, monkeypatch):
+    """A device that cannot be had ends an addition at once, not once for each shape."""
+
+    def refuse(self: Cuda) -> None:
+        msg = "no driver"
+        raise ParameterError(msg)
+
+    monkeypatch.setattr(Cuda, "runtime", refuse)
+    index = Index.open(tmp_path / "a.db")
+    with pytest.raises(ParameterError, match="no driver"):
+        index.add(folder, device=Cuda(), **SETTINGS)
+    assert not index.store.digests()

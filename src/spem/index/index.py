@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from spem.codes.batches import require_device
 from spem.codes.codes import Codes, Failure
 from spem.codes.model import Model
 from spem.codes.settings import Settings
@@ -164,6 +165,8 @@ class Index(Records):
         if cluster is not None and device is not None:
             msg = f"cluster={cluster} and device={device} exclude each other; give one of them"
             raise ParameterError(msg)
+        if device is not None:
+            require_device(device)
         local = LocalExecutor(n_jobs) if device is None else DeviceExecutor(device, n_jobs)
         manner = Manner(
             settings=agreed_settings(options, settings, model),
