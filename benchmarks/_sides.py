@@ -164,6 +164,9 @@ def run(
     with sweep.batch(systems, rho) as batch:
         fields, maps = side.project(batch, clock, fetch)
         total = clock.stop() - clock.seconds["download"]
+        if not fetch:
+            # many runs are kept, and these are large
+            fields, maps = [], []
         for b in range(len(batch)):
             batch.require(b)
         rank = max(reduced.turn.shape[1] for reduced in batch.reduced)
