@@ -24,10 +24,10 @@ from spem.shapes.shape import Shape
 N_RHO = 64
 # Above this many nodes a factorisation for each of a few ρ takes too long, in 2-D and in 3-D.
 DIRECT_NODES = {2: 20_000, 3: 4_000}
-REFERENCE_RTOL = 1e-10
-# Codes weigh all maps alike, the weakest too, and are right only as far as these are: a default sweep leaves
-# some percent open. So codes of two sides are held against each other from a sweep to this tolerance.
-CODE_RTOL = 1e-9
+REFERENCE_RTOL = 1e-11
+# Codes weigh all maps alike, the weakest too, and are right only as far as these are: a sweep to 1e-6 leaves
+# percents open. So codes of two sides are held against each other from a sweep to this tolerance.
+CODE_RTOL = 1e-10
 DEFAULT, TIGHT = f"code, sweep to {SWEEP_RTOL:g}", f"code, sweep to {CODE_RTOL:g}"
 FIELD_LIMIT, CODE_LIMIT = 1e-5, 1e-4
 
@@ -39,7 +39,12 @@ def errors(side: Side, name: str, shape: Shape, model: Model) -> Row:
     system = assemble(shape)
     exact = Sweep(rtol=REFERENCE_RTOL).hyperfield(system, rho)
     reference, some = exact.fields(), np.arange(N_RHO)
-    row: Row = {"shape": name, "side": side.name, "nodes": shape.n_nodes, "reference": "sweep to 1e-10"}
+    row: Row = {
+        "shape": name,
+        "side": side.name,
+        "nodes": shape.n_nodes,
+        "reference": f"sweep to {REFERENCE_RTOL:g}",
+    }
     if shape.n_nodes <= DIRECT_NODES[shape.ndim]:
         some = np.array([0, N_RHO // 2, N_RHO - 1])
         reference[:, some] = Direct().solve(system, rho[some]).values
