@@ -18,7 +18,7 @@ from spem.fields.rho import DEFAULT_COUNT, DEFAULT_RANGE, Scheme
 from spem.shapes.limits import DEFAULT_VOXELS
 
 # Raised whenever the same file would get another code under the same settings.
-CODE_FORMAT = 1
+CODE_FORMAT = 2
 
 Components = Literal["largest", "all"]
 # Settings that came later, and what files from before them mean.
