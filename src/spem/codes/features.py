@@ -20,7 +20,7 @@ from spem.fields.solvers.sweep import Sweep
 from spem.shapes.shape import Shape
 
 # Codes give the weakest maps the weight of the strongest: a sweep to 1e-6 leaves them percents off.
-SWEEP_RTOL = 1e-9
+SWEEP_RTOL = 1e-10
 
 
 def sweep_bands(shape: Shape, settings: Settings, threads: int | None = None) -> Hyperfield:
