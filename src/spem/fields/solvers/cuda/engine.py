@@ -208,9 +208,8 @@ class CudaEngine:
         return self.to_nodes(self._loaded.v)
 
     def close(self) -> None:
-        """Give memory back to the device; what is asked for afterwards is refused."""
+        """Let go of all arrays, for the next engine to use; what is asked for afterwards is refused."""
         self._workspace = self._sources = None
-        self.runtime.release()
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -291,6 +290,8 @@ class CudaEngine:
             traceback.clear_frames(error.__traceback__)
             n_blocks = len(self._workspace.blocks.arrays) + 1 if self._workspace is not None else 0
             self.close()
+            # What is left of arrays of other sizes goes back, so that a smaller batch has all there is.
+            self.runtime.release()
             msg = (
                 f"{self.runtime.name} ran out of memory, with {_told(self._free)} free at first: "
                 f"{self._sizes(n_blocks)}; {_ADVICE}"
