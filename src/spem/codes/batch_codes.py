@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +21,19 @@ from spem.codes.word_sums import Kept, Rows, WordSums
 from spem.embedding.maps import principal_components
 from spem.errors import ParameterError, SizeError
 from spem.fields.solvers.batch import Batch
+from spem.fields.solvers.cuda.engine import CudaEngine
 from spem.fields.solvers.cuda.runtime import Array, Runtime
 
 
-def project_maps(batch: Batch, settings: Settings, band: int) -> Array:
+def project_maps(batch: Batch, engine: CudaEngine, settings: Settings, band: int) -> Array:
     """Compute the maps of one band of all shapes of a batch.
 
     Parameters
     ----------
     batch
-        Shapes swept over the ρ of all bands, on a device.
+        Shapes swept over the ρ of all bands.
+    engine
+        The engine of the batch.
     settings
         Settings of SPEM maps.
     band
@@ -43,7 +45,6 @@ def project_maps(batch: Batch, settings: Settings, band: int) -> Array:
         ``(n_rows, n_maps)`` float32 on the device.
     """
     mixes = [_mix(batch, index, settings, band) for index in range(len(batch))]
-    engine: Any = batch.engine
     return engine.project(*(np.stack(each) for each in zip(*mixes, strict=True)))
 
 
@@ -85,12 +86,13 @@ def batch_features(batch: Batch, settings: Settings, kept: Sequence[Kept]) -> li
     SizeError
         When they do not fit into the memory of the device.
     """
-    engine: Any = batch.engine
-    if not hasattr(engine, "project"):
+    engine = batch.engine
+    if not isinstance(engine, CudaEngine):
         return [node_features(field, settings) for field in batch.hyperfields()]
     with _memory(engine.runtime, batch):
         bands = [
-            engine.to_nodes(project_maps(batch, settings, band)) for band in range(len(settings.rho_ranges))
+            engine.to_nodes(project_maps(batch, engine, settings, band))
+            for band in range(len(settings.rho_ranges))
         ]
     return [
         tuple(np.ascontiguousarray(maps if keep.all() else maps[keep], np.float32) for maps in shape)
@@ -120,8 +122,8 @@ def batch_codes(batch: Batch, part: Part, kept: Sequence[Kept]) -> list[NDArray[
     SizeError
         When they do not fit into the memory of the device.
     """
-    engine: Any = batch.engine
-    if not hasattr(engine, "project"):
+    engine = batch.engine
+    if not isinstance(engine, CudaEngine):
         features = batch_features(batch, part.settings, kept)
         return [
             part.encode(bands, system.shape.name)
@@ -130,7 +132,7 @@ def batch_codes(batch: Batch, part: Part, kept: Sequence[Kept]) -> list[NDArray[
     with _memory(engine.runtime, batch):
         rows = Rows.of(engine, kept)
         bands = [
-            WordSums.of(part, band, rows, engine.runtime)(project_maps(batch, part.settings, band))
+            WordSums.of(part, band, rows, engine.runtime)(project_maps(batch, engine, part.settings, band))
             for band in range(len(part.centers))
         ]
     names = (system.shape.name for system in batch.systems)

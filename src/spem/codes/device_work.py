@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -105,19 +106,23 @@ class DeviceWork:
             Called for each source that is done with its hash and dimension, 0 where it failed.
         """
         task = _Task(self.folder, self.settings, self.model, self.threads)
-        waiting: dict[str, int] = {}
-        for (key, source), drafted, reason in run_all(task, todo, n_jobs):
-            if drafted is None:
-                listing.fail(source, reason, key)
-                done(key, 0)
-            elif not drafted.n_nodes:
-                done(key, drafted.ndim)
-            else:
-                waiting[key] = drafted.n_nodes
-            if sum(waiting.values()) >= BATCH_NODES:
-                self._finish(list(waiting), listing, done)
-                waiting.clear()
-        self._finish(list(waiting), listing, done)
+        waiting: list[str] = []
+        n_nodes = 0
+        # What fails on the device ends the processes that read.
+        with closing(run_all(task, todo, n_jobs)) as outcomes:
+            for (key, source), drafted, reason in outcomes:
+                if drafted is None:
+                    listing.fail(source, reason, key)
+                    done(key, 0)
+                elif not drafted.n_nodes:
+                    done(key, drafted.ndim)
+                else:
+                    waiting.append(key)
+                    n_nodes += drafted.n_nodes
+                if n_nodes >= BATCH_NODES:
+                    self._finish(waiting, listing, done)
+                    waiting, n_nodes = [], 0
+        self._finish(waiting, listing, done)
 
     def _finish(self, keys: Sequence[str], listing: Listing, done: Done) -> None:
         """Turn drafts of sources into entries; files are read and written by threads, which hash them too."""

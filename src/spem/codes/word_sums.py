@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from spem.codes.part import Part
 from spem.codes.vocabulary import Residuals
 from spem.errors import ParameterError
+from spem.fields.solvers.cuda.engine import CudaEngine
 from spem.fields.solvers.cuda.runtime import THREADS, TILE, Array, Program, Runtime
 
 _SOURCE = "spem.codes.cuda/vlad.cu"
@@ -55,7 +55,7 @@ class Rows:
     first_chunk: Array
 
     @classmethod
-    def of(cls, engine: Any, kept: Sequence[Kept]) -> Rows:
+    def of(cls, engine: CudaEngine, kept: Sequence[Kept]) -> Rows:
         """Find the rows of the nodes of an engine's systems.
 
         Parameters

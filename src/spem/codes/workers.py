@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
@@ -56,7 +56,9 @@ def count_processes(n_shapes: int) -> int:
     return max(1, min(usable_threads(), n_shapes // _SHAPES_PER_PROCESS))
 
 
-def run_all(work: Callable[[T], R], tasks: Iterable[T], n_jobs: int = 1) -> Iterator[tuple[T, R | None, str]]:
+def run_all(
+    work: Callable[[T], R], tasks: Iterable[T], n_jobs: int = 1
+) -> Generator[tuple[T, R | None, str], None, None]:
     """Run a function over tasks and yield outcomes as they come.
 
     Each process has one thread. In this process numerical libraries have one, so that results do not

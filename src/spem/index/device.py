@@ -59,15 +59,17 @@ class DeviceExecutor:
         settings = work.settings if isinstance(work, Make) else work.model.settings
         read = _Read(settings, model, work.keep_shape)
         waiting: list[tuple[Item, Read]] = []
-        with closing(run_all(read, items, self.n_jobs)) as outcomes:  # type: ignore[type-var]
+        n_nodes = 0
+        with closing(run_all(read, items, self.n_jobs)) as outcomes:
             for item, found, reason in outcomes:
                 if found is None:
                     yield item, None, reason
                     continue
                 waiting.append((item, found))
-                if sum(map(_nodes, waiting)) >= BATCH_NODES:
+                n_nodes += _nodes(found)
+                if n_nodes >= BATCH_NODES:
                     yield from self._complete(waiting, settings, model)
-                    waiting = []
+                    waiting, n_nodes = [], 0
         yield from self._complete(waiting, settings, model)
 
     def _complete(
@@ -104,9 +106,9 @@ class _Read:
         return CodeDraft("", "", kinds, shape.ndim, shape.volume, waits)
 
 
-def _nodes(read: tuple[Item, Read]) -> int:
+def _nodes(read: Read) -> int:
     """Count the nodes of a source that wait for the device."""
-    drafts = (draft for _, draft in read[1] if isinstance(draft, CodeDraft))
+    drafts = (draft for _, draft in read if isinstance(draft, CodeDraft))
     return sum(draft.shape.n_nodes for draft in drafts if draft.shape is not None)
 
 
