@@ -64,12 +64,12 @@ def test_collection_with_a_device_is_that_without(folder: Path, whole: Codes, n_
 
 
 def test_collection_on_the_simulator_has_the_codes_of_the_host(folder: Path) -> None:
-    """Codes of the paper's kind, of maps that the usual tolerance gets right, agree with a given model."""
+    """With a given model a device makes the codes of the host to 1e-4."""
     settings = Settings.paper(voxels=None, n_maps=3, n_centers=4)
     files = find_files([folder])
     known = encode_collection(files, settings)
     codes = spem.encode(files, model=known.model, device=Simulated())
-    assert np.linalg.norm(codes.vectors - known.vectors, axis=1).max() < 1e-3
+    assert np.linalg.norm(codes.vectors - known.vectors, axis=1).max() < 1e-4
     answer = spem.search(codes, files[2], device=Simulated())
     assert answer[0].name == "e2"
 
@@ -145,10 +145,6 @@ def test_failures_are_those_of_the_host(folder: Path, tmp_path: Path) -> None:
     files = [*find_files([folder])[:2], *find_files([tmp_path])]
     settings = replace(SETTINGS, drop_boundary=True, per_label=True)
     heard: list[int] = []
-
-    def progress(stage: str, done: int, _: int) -> None:
-        if stage == "fields":
-            heard.append(done)
 
     expected = encode_collection(files, settings)
     found = encode_collection(
