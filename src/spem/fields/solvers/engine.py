@@ -19,9 +19,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from spem.errors import ParameterError
 from spem.fields.operator import System
 
 LANES = 8
+# In units of the spacing; single precision holds the square of its inverse.
+_LEAST_RHO = 1e-6
 
 Small = NDArray[np.float64]
 
@@ -166,3 +169,26 @@ class Backend(Protocol):
             When they do not fit into its memory; half of them, or one, may.
         """
         ...
+
+
+def require_rho(system: System, rho: NDArray[np.float64]) -> None:
+    """Refuse ρ that single precision cannot hold.
+
+    Raises
+    ------
+    ParameterError
+        When one is below a millionth of the spacing.
+
+    Examples
+    --------
+    >>> from spem.fields.operator import assemble
+    >>> from spem.shapes.shape import Shape
+    >>> require_rho(assemble(Shape.from_mask(np.ones((3, 3)))), np.array([0.5, np.inf]))
+    """
+    unit = min(system.shape.spacing)
+    if rho.min(initial=np.inf) < _LEAST_RHO * unit:
+        msg = (
+            f"{system.shape.name}: rho={rho.min():g} is below {_LEAST_RHO:g} of the spacing {unit:g}, "
+            "where fields vanish on every node; use a larger rho or a finer spacing"
+        )
+        raise ParameterError(msg)

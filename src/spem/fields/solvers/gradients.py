@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spem.errors import ConvergenceError, ParameterError, SizeError
 from spem.fields.operator import System
-from spem.fields.solvers.engine import LANES, Backend
+from spem.fields.solvers.engine import LANES, Backend, require_rho
 from spem.fields.solvers.host import Host
 from spem.fields.solvers.protocol import Solution
 from spem.fields.solvers.refinement import Refined, refine
@@ -18,8 +18,6 @@ from spem.fields.solvers.refinement import Refined, refine
 # On a device groups are solved together up to so many nodes: about where passes over vectors outlast the
 # launches of their kernels. Estimated from bandwidth and launch times, not measured.
 _BATCH_NODES = 1_000_000
-# In units of the spacing; single precision holds the square of its inverse.
-_LEAST_RHO = 1e-6
 
 
 @dataclass(frozen=True)
@@ -87,7 +85,7 @@ class MultigridGradients:
             If the system does not fit into the memory of the device.
         """
         finite = np.isfinite(rho)
-        _require_rho(system, rho)
+        require_rho(system, rho)
         shifts = rho[finite] ** -2.0
         outcome = _solve(self, system, system.mass[:, None] * shifts, shifts)
         values, residual = np.ones((system.n_nodes, rho.size)), np.zeros(rho.size)
@@ -106,7 +104,7 @@ class MultigridGradients:
         ParameterError
             If 1/√shift is below a millionth of the spacing.
         """
-        _require_rho(system, np.array([shift]) ** -0.5 if shift > 0 else np.array([np.inf]))
+        require_rho(system, np.array([shift]) ** -0.5 if shift > 0 else np.array([np.inf]))
         return PreparedMultigrid(system, shift, self)
 
 
@@ -159,17 +157,6 @@ class PreparedMultigrid:
             )
             raise ConvergenceError(msg, Solution(values, residual, False, int(spent.sum())))
         return values.reshape(rhs.shape)
-
-
-def _require_rho(system: System, rho: NDArray[np.float64]) -> None:
-    """Refuse ρ that single precision cannot hold."""
-    unit = min(system.shape.spacing)
-    if rho.min(initial=np.inf) < _LEAST_RHO * unit:
-        msg = (
-            f"{system.shape.name}: rho={rho.min():g} is below {_LEAST_RHO:g} of the spacing {unit:g}, "
-            "where fields vanish on every node; use a larger rho or a finer spacing"
-        )
-        raise ParameterError(msg)
 
 
 def _spread(system: System, nodes: NDArray[np.int64], guess: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ from spem.errors import ParameterError, SizeError
 from spem.fields.hyperfield import Hyperfield
 from spem.fields.operator import System
 from spem.fields.solvers.batch import Batch
-from spem.fields.solvers.engine import Backend, Small
+from spem.fields.solvers.engine import Backend, Small, require_rho
 from spem.fields.solvers.host import Host
 from spem.fields.solvers.poles import Targets
 from spem.fields.solvers.protocol import Solution
@@ -28,8 +28,6 @@ _SINGLE_STORAGE = 3e-7
 # Basis directions that contribute less than this fraction of the tolerance are dropped at the end.
 _DROPPED = 1e-2
 
-# In units of the spacing; single precision holds the square of its inverse.
-_LEAST_RHO = 1e-6
 # Of the lowest eigenvalue: the deficit at such a shift is far below the tolerance everywhere.
 _NEGLIGIBLE = 1e-3
 
@@ -143,13 +141,12 @@ class Sweep:
             When they do not fit into the memory of the device together.
         """
         for system, each in zip(systems, rho, strict=True):
-            _require_rho(system, each)
+            require_rho(system, each)
         backend = self.device if self.device is not None else Host(self.threads)
         engine = backend.open(systems, np.float32 if self.rtol > _SINGLE_STORAGE else np.float64)
         try:
             targets = [self._targets(*each, between) for each in zip(systems, rho, engine.units, strict=True)]
-            # of an uncut grid
-            highest = np.array([4 * system.weights.sum() for system in systems]) * np.square(engine.units)
+            highest = np.array([_highest(system) for system in systems]) * np.square(engine.units)
             outcome = Rounds(engine, targets, highest, self.rtol, self.max_blocks, self.max_iterations).run()
             reduced = [
                 outcome.bases.compress(index, target.dense(), _DROPPED * self.rtol)
@@ -174,15 +171,9 @@ class Sweep:
         return Targets(np.maximum(shifts, _NEGLIGIBLE * self.rtol * _box_eigenvalue(system)), between)
 
 
-def _require_rho(system: System, rho: NDArray[np.float64]) -> None:
-    """Refuse ρ at which fields vanish on every node."""
-    unit = min(system.shape.spacing)
-    if rho.min() < _LEAST_RHO * unit:
-        msg = (
-            f"{system.shape.name}: rho={rho.min():g} is below {_LEAST_RHO:g} of the spacing {unit:g}, "
-            "where fields vanish on every node; use a larger rho or a finer spacing"
-        )
-        raise ParameterError(msg)
+def _highest(system: System) -> float:
+    """Upper bound of the eigenvalues of M⁻¹A, by Gershgorin's circles; edges that are cut short raise it."""
+    return float(2 * np.max(system.diagonal / system.mass))
 
 
 def _box_eigenvalue(system: System) -> float:

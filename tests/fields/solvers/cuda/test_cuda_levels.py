@@ -11,7 +11,8 @@ from simulator import SimulatedRuntime
 from spem.errors import ParameterError
 from spem.fields.operator import assemble
 from spem.fields.solvers import multigrid
-from spem.fields.solvers.cuda.levels import Hierarchy, hierarchy_bytes
+from spem.fields.solvers.cuda.footprint import hierarchy_bytes
+from spem.fields.solvers.cuda.levels import Hierarchy
 from spem.fields.solvers.cuda.runtime import TILE
 from spem.shapes.shape import Cuts, Shape
 

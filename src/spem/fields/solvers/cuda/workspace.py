@@ -13,8 +13,9 @@ from spem.errors import ParameterError, SizeError
 from spem.fields.operator import System
 from spem.fields.solvers.cuda.blocks import Blocks
 from spem.fields.solvers.cuda.cycle import Cycle
+from spem.fields.solvers.cuda.footprint import hierarchy_bytes
 from spem.fields.solvers.cuda.krylov import Krylov, Vectors
-from spem.fields.solvers.cuda.levels import Hierarchy, hierarchy_bytes
+from spem.fields.solvers.cuda.levels import Hierarchy
 from spem.fields.solvers.cuda.meter import Meter
 from spem.fields.solvers.cuda.runtime import TILE, Array, Runtime
 from spem.fields.solvers.engine import LANES
