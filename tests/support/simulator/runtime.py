@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -34,10 +35,18 @@ class SimulatedProgram:
 
     def launch(self, kernel: str, n_blocks: int, *arguments: Any) -> None:
         """Run a kernel, then look at the guards of the arrays that it could reach."""
+        self.bind(kernel, n_blocks, *arguments)()
+
+    def bind(self, kernel: str, n_blocks: int, *arguments: Any) -> Callable[[], None]:
+        """Check a launch once, and return what runs it."""
         if kernel not in self.library.kernels:
             msg = f"no kernel {kernel}; the source has {', '.join(self.library.kernels)}"
             raise TypeError(msg)
         self.library.kernels[kernel].check(arguments)
+        return partial(self._run, kernel, n_blocks, arguments)
+
+    def _run(self, kernel: str, n_blocks: int, arguments: tuple[Any, ...]) -> None:
+        """Run a kernel with arguments that were checked."""
         if n_blocks == 0:
             return
         held = [_place(argument) for argument in arguments]

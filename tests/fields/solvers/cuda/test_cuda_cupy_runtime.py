@@ -98,6 +98,21 @@ def test_launches(program: tuple[CupyProgram, Module]) -> None:
         made.launch("nothing", 1)
 
 
+def test_bound_launches(program: tuple[CupyProgram, Module]) -> None:
+    """What is bound is checked at once, run as often as it is called, and never on no blocks."""
+    made, module = program
+    kernel = next(iter(made._kernels))
+    arguments = arguments_of(made, kernel)
+    run, idle = made.bind(kernel, 7, *arguments), made.bind(kernel, 0, *arguments)
+    assert module.calls == []
+    for launch in (run, idle, run):
+        launch()
+    passed = tuple(np.int64(0) if one is None else one for one in arguments)
+    assert module.calls == [(kernel, (7,), (THREADS,), passed)] * 2
+    with pytest.raises(TypeError, match=f"kernel {kernel}: expected {len(arguments)} arguments, got"):
+        made.bind(kernel, 1, *arguments, None)
+
+
 def test_a_launch_without_memory(program: tuple[CupyProgram, Module]) -> None:
     """A driver without memory is an error of memory; any other failure stays what it is."""
     made, module = program

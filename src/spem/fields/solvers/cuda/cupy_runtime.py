@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from importlib import import_module
 from typing import Any
 
@@ -87,17 +88,25 @@ class CupyProgram:
 
     def launch(self, kernel: str, n_blocks: int, *arguments: Any) -> None:
         """Run a kernel, see `spem.fields.solvers.cuda.runtime.Program`."""
+        self.bind(kernel, n_blocks, *arguments)()
+
+    def bind(self, kernel: str, n_blocks: int, *arguments: Any) -> Callable[[], None]:
+        """Check a launch once, see `spem.fields.solvers.cuda.runtime.Program`."""
         if kernel not in self._kernels:
             msg = f"{self._source} has no kernel {kernel}; it has {', '.join(self._kernels)}"
             raise TypeError(msg)
         self._kernels[kernel].check(arguments)
-        if n_blocks == 0:
-            return
         # CuPy passes None as no argument at all, which the driver reads; the null pointer is a number.
         passed = tuple(np.int64(0) if argument is None else argument for argument in arguments)
+        return partial(self._run, kernel, int(n_blocks), passed)
+
+    def _run(self, kernel: str, n_blocks: int, passed: tuple[Any, ...]) -> None:
+        """Run a kernel with arguments that were checked."""
+        if n_blocks == 0:
+            return
         self._device.use()
         try:
-            self._function(kernel)((int(n_blocks),), (THREADS,), passed)
+            self._function(kernel)((n_blocks,), (THREADS,), passed)
         except self._cupy.cuda.driver.CUDADriverError as error:
             if error.status != _OUT_OF_MEMORY:
                 raise

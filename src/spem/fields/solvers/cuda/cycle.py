@@ -7,7 +7,8 @@ is in the batch.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -56,6 +57,7 @@ class Cycle:
         self.partial = runtime.empty((levels[0].layout.n_rows // TILE, LANES), np.float64)
         self.shift = runtime.zeros(count * LANES, np.float32)
         self._inverse = runtime.empty(count * COARSEST**2 * LANES, np.float32)
+        self._launches: tuple[Array, Array, list[Callable[[], None]]] | None = None
         self._entry = _entries(hierarchy, tail_tiles)
         self._tables = runtime.upload(self._addresses())
         ranges = np.stack([_ranges(level) for level in levels]).astype(np.int32)
@@ -92,6 +94,7 @@ class Cycle:
             lists += [layout.tiles(here, "red"), layout.tiles(here, "black"), coarse.tiles(here, "all")]
         self._systems, *tiles = upload_lists(self.runtime, lists)
         self._tiles = [tuple(tiles[k : k + 3]) for k in range(0, len(tiles), 3)]
+        self._launches = None
 
     def apply(self, r: Array, z: Array) -> None:
         """Write the cycle's answer to r into z, and r·z of each tile into `partial`.
@@ -101,48 +104,60 @@ class Cycle:
         r, z
             ``(n_rows + 1, LANES)`` float32 vectors of the finest level.
         """
+        if self._launches is None or self._launches[0] is not r or self._launches[1] is not z:
+            self._launches = r, z, self._bind(r, z)
+        for launch in self._launches[2]:
+            launch()
+
+    def _bind(self, r: Array, z: Array) -> list[Callable[[], None]]:
+        """Check the launches of a cycle once: it is run dozens of times between two choices of systems."""
         residuals, answers = [r, *self._r[1:]], [z, *self._z[1:]]
-        for depth in range(len(self._tiles)):
-            self._descend(depth, residuals, answers)
-        self._program.launch(
+        depths = range(len(self._tiles))
+        down = [self._descend(depth, residuals, answers) for depth in depths]
+        up = [self._ascend(depth, residuals, answers) for depth in reversed(depths)]
+        tail = self._program.bind(
             "cycle_tail",
             self._systems.size,
             *(self._systems, self._tables, *self._places, *self._bounds),
             *(self.shift, self._inverse, r, z, self.partial),
         )
-        for depth in reversed(range(len(self._tiles))):
-            self._ascend(depth, residuals, answers)
+        return [*chain(*down), tail, *chain(*up)]
 
-    def _descend(self, depth: int, residuals: Sequence[Array], answers: Sequence[Array]) -> None:
+    def _descend(
+        self, depth: int, residuals: Sequence[Array], answers: Sequence[Array]
+    ) -> tuple[Callable[[], None], ...]:
         level, coarse = self.hierarchy.levels[depth : depth + 2]
         _, black, above = self._tiles[depth]
         n_rows, fine = np.int32(level.layout.n_rows), np.int32(depth == 0)
-        self._program.launch(
+        down = self._program.bind(
             "cycle_down",
             black.size,
             *(black, level.layout.tile_system, *_graph(level), n_rows, fine, self.shift),
             *(residuals[depth], answers[depth]),
         )
-        self._program.launch(
+        restrict = self._program.bind(
             "cycle_restrict",
             above.size,
             *(above, coarse.layout.tile_system, coarse.children, level.neighbours, level.weight),
             *(n_rows, fine, answers[depth], residuals[depth + 1]),
         )
+        return down, restrict
 
-    def _ascend(self, depth: int, residuals: Sequence[Array], answers: Sequence[Array]) -> None:
+    def _ascend(
+        self, depth: int, residuals: Sequence[Array], answers: Sequence[Array]
+    ) -> tuple[Callable[[], None], ...]:
         level, coarse = self.hierarchy.levels[depth : depth + 2]
         red, black, _ = self._tiles[depth]
         n_rows, fine = np.int32(level.layout.n_rows), np.int32(depth == 0)
         common = level.layout.tile_system, *_graph(level), n_rows, fine, self.shift
         n_coarse = np.int32(coarse.layout.n_rows)
         own = residuals[depth], answers[depth], self.partial
-        self._program.launch(
+        relax_black = self._program.bind(
             "cycle_black",
             black.size,
             *(black, *common, level.parent, n_coarse, answers[depth + 1], *own),
         )
-        self._program.launch("cycle_red", red.size, red, *common, *own)
+        return relax_black, self._program.bind("cycle_red", red.size, red, *common, *own)
 
     def _addresses(self) -> NDArray[np.int64]:
         """Rows of `Table` in cycle.cu."""

@@ -29,6 +29,7 @@ _KERNEL = re.compile(
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]+"([^"]+)"[^\n]*$', re.MULTILINE)
 _ALIAS = re.compile(r"\busing\s+(\w+)\s*=\s*([\w\s]+?)\s*;|\btypedef\s+([\w\s]+?)\s+(\w+)\s*;")
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+_ON_HOST = np.ndarray, np.generic
 _NUMBERS = {
     "float": "float32",
     "double": "float64",
@@ -65,7 +66,7 @@ class Parameter:
         """Whether an argument is a contiguous device array, or a NumPy scalar, of the right type."""
         if not self.pointer:
             return isinstance(argument, np.generic) and argument.dtype in self.dtypes
-        if isinstance(argument, np.ndarray | np.generic) or not hasattr(argument, "flags"):
+        if isinstance(argument, _ON_HOST) or not hasattr(argument, "flags"):
             return argument is None
         return argument.dtype in self.dtypes and bool(argument.flags.c_contiguous)
 

@@ -5,13 +5,15 @@ that the same code runs on a GPU by CuPy and in a simulator over NumPy.
 
 ``runtime.program("cycle.cu", ORDER=2)`` compiles a source of this folder,
 ``runtime.program("spem.codes.cuda/vlad.cu")`` one of another package (`spem.fields.solvers.cuda.programs`);
-``.launch("name", n_blocks, *arguments)`` runs a kernel of it.
+``.launch("name", n_blocks, *arguments)`` runs a kernel of it; ``.bind`` takes the same, to run it again and
+again.
 
 Host and device arrays are never mixed: `Runtime.upload` and `Runtime.download` are the ways between them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -44,6 +46,13 @@ class Program(Protocol):
         ------
         TypeError
             When number or types of the arguments are not those of the kernel.
+        """
+        ...
+
+    def bind(self, kernel: str, n_blocks: int, *arguments: Any) -> Callable[[], None]:
+        """Check a launch once, and return what runs it, many times over; it holds on to its arrays.
+
+        Parameters and errors are those of `launch`.
         """
         ...
 
