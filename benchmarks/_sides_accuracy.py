@@ -25,15 +25,11 @@ N_RHO = 64
 # Above this many nodes a factorisation for each of a few ρ takes too long, in 2-D and in 3-D.
 DIRECT_NODES = {2: 20_000, 3: 4_000}
 REFERENCE_RTOL = 1e-11
-# Codes weigh all maps alike, the weakest too, and are right only as far as these are: a sweep to 1e-6 leaves
-# percents open. So codes of two sides are held against each other from a sweep to this tolerance.
-CODE_RTOL = 1e-10
-DEFAULT, TIGHT = f"code, sweep to {SWEEP_RTOL:g}", f"code, sweep to {CODE_RTOL:g}"
 FIELD_LIMIT, CODE_LIMIT = 1e-5, 1e-4
 
 
 def errors(side: Side, name: str, shape: Shape, model: Model) -> Row:
-    """Return worst relative errors of one shape's fields and maps, and of its code for two tolerances."""
+    """Return worst relative errors of one shape's fields and maps, and of its code."""
     found = run(side, [shape], N_RHO, fetch=True)
     rho = sample_rho(shape.size, count=N_RHO)
     system = assemble(shape)
@@ -52,8 +48,7 @@ def errors(side: Side, name: str, shape: Shape, model: Model) -> Row:
     row["field"] = worst(found.fields[0][:, some], reference[:, some])
     row["maps"] = worst(found.maps[0], compute_maps(exact, N_MAPS).values)
     best = codes(Processor(), [shape], model, REFERENCE_RTOL)
-    row[DEFAULT] = code_error(codes(side, [shape], model, SWEEP_RTOL), best)
-    row[TIGHT] = code_error(codes(side, [shape], model, CODE_RTOL), best)
+    row["code"] = code_error(codes(side, [shape], model), best)
     return row
 
 
@@ -63,7 +58,7 @@ def worst(values: np.ndarray, reference: np.ndarray) -> float:
     return float((off / np.abs(reference).max(axis=0)).max())
 
 
-def codes(side: Side, shapes: Sequence[Shape], model: Model, rtol: float) -> np.ndarray:
+def codes(side: Side, shapes: Sequence[Shape], model: Model, rtol: float = SWEEP_RTOL) -> np.ndarray:
     """Return the codes of shapes, fields and all, on a side."""
     return encode_shapes(shapes, model, device=side.backend(profile=False), rtol=rtol)
 
