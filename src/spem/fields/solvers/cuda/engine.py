@@ -301,7 +301,7 @@ class CudaEngine:
     def _sizes(self, n_blocks: int) -> str:
         """Say how large the batch is."""
         batch = told(self.counts.size, int(self.counts.sum()))
-        return f"{batch} with {LANES * n_blocks} columns take about {_told(self._bytes_with(n_blocks))}"
+        return f"{batch} with {LANES * n_blocks} columns would take about {_told(self._bytes_with(n_blocks))}"
 
 
 def _told(n_bytes: int) -> str:
