@@ -185,6 +185,20 @@ def test_selecting_takes_the_last_step_and_leaves_others_alone():
     assert not solver.krylov.search(None).any()
 
 
+def test_selecting_the_same_systems_moves_nothing(monkeypatch):
+    """What is selected already is not uploaded again, and other shifts for it still count."""
+    rhs = np.random.default_rng(1).standard_normal((ball(3).n_nodes, LANES))
+    solver = Solver(ball(3))
+    first = solver.start(rhs)
+    uploads = []
+    with monkeypatch.context() as patch:
+        patch.setattr(solver.runtime, "upload", uploads.append)
+        solver.krylov.select(solver.active.copy())
+    assert uploads == []
+    assert np.array_equal(solver.krylov.precondition(), first)
+    assert np.array_equal(solver.start(rhs, 2 * SHIFTS), Solver(ball(3)).start(rhs, 2 * SHIFTS))
+
+
 def test_lanes_with_nothing_to_solve_stay_zero():
     """Lanes with r = 0 have x = 0 after any number of iterations, and no product is wrong for them."""
     solver = Solver(porous(7, 7, 7))

@@ -58,6 +58,7 @@ class Cycle:
         self.shift = runtime.zeros(count * LANES, np.float32)
         self._inverse = runtime.empty(count * COARSEST**2 * LANES, np.float32)
         self._launches: tuple[Array, Array, list[Callable[[], None]]] | None = None
+        self._active: Flags | None = None
         self._entry = _entries(hierarchy, tail_tiles)
         self._tables = runtime.upload(self._addresses())
         ranges = np.stack([_ranges(level) for level in levels]).astype(np.int32)
@@ -75,6 +76,7 @@ class Cycle:
             ``(n_systems,)`` as for `select`.
         """
         self.shift = self.runtime.upload(shifts.astype(np.float32).ravel())
+        self._launches = None
         self.select(active)
         systems, (_, depth) = self._systems, self._bounds
         self._program.launch(
@@ -85,6 +87,9 @@ class Cycle:
 
     def select(self, active: Flags) -> None:
         """Work on these systems only, ``(n_systems,)``; they have been active in the last `prepare`."""
+        if self._active is not None and np.array_equal(active, self._active):
+            return
+        self._active = active.copy()
         levels = self.hierarchy.levels
         top = int(self._entry[active].max(initial=0))
         lists = [np.flatnonzero(active).astype(np.int32)]

@@ -63,6 +63,7 @@ class Krylov:
         self._partial = runtime.empty((self._layout.n_rows // TILE, LANES), np.float64)
         self._still = runtime.zeros(self._count * LANES, np.float32)
         self._step = self._still
+        self._active: Flags | None = None
 
     def prepare(self, shifts: Small, active: Flags) -> None:
         """Take the shifts ``(n_systems, LANES)`` and the active systems ``(n_systems,)`` of a round."""
@@ -112,7 +113,10 @@ class Krylov:
             self._step = self._still
 
     def _choose(self, active: Flags) -> None:
-        """Upload the tiles of systems, and the runs of them that are added up together."""
+        """Upload the tiles of systems, and the runs that are added up together, unless they are there."""
+        if self._active is not None and np.array_equal(active, self._active):
+            return
+        self._active = active.copy()
         tiles = self._layout.tiles(active)
         first, end = self._layout.first_tile[:-1][active], self._layout.first_tile[1:][active]
         starts = [np.arange(a, b, _RUN_TILES) for a, b in zip(first, end, strict=True)]
