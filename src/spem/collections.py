@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from spem.codes.batches import require_device
 from spem.codes.codes import Codes
 from spem.codes.collection import encode_collection, encode_file
 from spem.codes.model import Model
@@ -127,6 +128,8 @@ def search(
     'disk'
     """
     collection = codes if isinstance(codes, Codes) else Codes.load(codes)
+    if device is not None:
+        require_device(device)
     row = _row(collection, query)
     vector = encode_file(query, collection.model, device=device) if row is None else collection.vectors[row]
     return rank(vector, collection, k)

@@ -100,3 +100,38 @@ def test_a_hyperfield_has_been_swept(shapes):
     """Maps of a hyperfield take no device: its sweep is over."""
     with pytest.raises(ParameterError, match="rtol and device are its own; give them to sweep"):
         spem.maps(spem.sweep(shapes[0]), device=Small())
+
+
+@pytest.mark.parametrize("wrong", ["cuda", 0, spem.Cuda, "cpu"])
+def test_what_is_no_device_is_refused(shapes, wrong):
+    """Words, numbers and classes are no devices; the processor is not taken in their place."""
+    shape = shapes[0]
+    calls = [
+        lambda: spem.field(shape, 3.0, device=wrong),
+        lambda: spem.sweep(shape, device=wrong),
+        lambda: spem.sweep_many([shape], device=wrong),
+        lambda: spem.maps(shape, device=wrong),
+        lambda: spem.encode([shape], n_centers=2, device=wrong),
+        lambda: spem.MultigridGradients(device=wrong),
+    ]
+    for call in calls:
+        with pytest.raises(ParameterError, match=r"^device=.*: expected spem\.Cuda\(\) or another backend"):
+            call()
+
+
+@pytest.mark.parametrize("wrong", ["multigrid", spem.MultigridGradients])
+def test_what_is_no_solver_is_refused(shapes, wrong):
+    """Words and classes are no solvers, of fields or of single sources."""
+    with pytest.raises(ParameterError, match=r"^solver=.*: expected a solver, such as spem\.Multi"):
+        spem.field(shapes[0], 3.0, solver=wrong)
+    with pytest.raises(ParameterError, match=r"^solver=.*: expected a solver, such as spem\.Multi"):
+        spem.SourceHyperfield(spem.sources(shapes[0], 8), [2.0], solver=wrong)
+
+
+def test_many_are_any_shapes_in_a_row(shapes):
+    """Shapes may be generated; a single one, or what holds none, is refused."""
+    found = spem.sweep_many((shape for shape in shapes[2:]), [2.0, 4.0])
+    assert [field.shape for field in found] == shapes[2:]
+    for wrong in (shapes[0], 5, None):
+        with pytest.raises(ParameterError, match=r"^shapes=.*: expected a list of shapes"):
+            spem.sweep_many(wrong)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from spem.fields.hyperfield import Hyperfield
 from spem.fields.operator import Boundary, assemble
 from spem.fields.rho import DEFAULT_COUNT, Scheme, check_rho, sample_rho
 from spem.fields.solvers.engine import Backend
-from spem.fields.solvers.protocol import Solver
+from spem.fields.solvers.protocol import Solver, require_solver
 from spem.fields.solvers.sweep import Sweep
 from spem.shapes.shape import Shape
 
@@ -52,7 +52,7 @@ def field(
     Raises
     ------
     ParameterError
-        If a ρ is not positive, or a solver and a device are given together.
+        If a ρ is not positive, or a solver and a device are given together, or are none.
     ConvergenceError
         If the solver misses its tolerance; it carries the best iterate.
     SizeError
@@ -65,6 +65,7 @@ def field(
     >>> print(round(float(v.min()), 3))  # 1 / cosh(4.5 / 2)
     0.209
     """
+    require_solver(solver)
     if solver is not None and device is not None:
         msg = f"solver={solver!r} and device={device!r} exclude each other; give the device to the solver"
         raise ParameterError(msg)
@@ -121,7 +122,7 @@ def sweep(
 
 
 def sweep_many(
-    shapes: Sequence[Shape],
+    shapes: Iterable[Shape],
     rho: ArrayLike | None = None,
     *,
     n_rho: int = DEFAULT_COUNT,
@@ -161,11 +162,11 @@ def sweep_many(
     >>> [field.shape.n_nodes for field in spem.sweep_many(disks, rho=[2, 4])]
     [193, 249]
     """
-    if isinstance(shapes, Shape):
+    if isinstance(shapes, Shape) or not isinstance(shapes, Iterable):
         msg = f"shapes={shapes!r}: expected a list of shapes; use spem.sweep for one"
         raise ParameterError(msg)
+    shapes, given = list(shapes), None if rho is None else check_rho(rho)
     systems = [assemble(shape, boundary) for shape in shapes]
-    given = None if rho is None else check_rho(rho)
     solver, found = Sweep(rtol=rtol, device=device), dict[int, Hyperfield]()
     for ndim in sorted({shape.ndim for shape in shapes}):
         rows = [row for row, shape in enumerate(shapes) if shape.ndim == ndim]

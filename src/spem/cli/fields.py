@@ -108,16 +108,16 @@ def field(
       spem field hand.png --source 12,40 -o tip.npz --plot tip.png
       spem field cat.off --patch 0.1,-20,31.5 --patches 100 --rho 5,inf -o ear.npz
     """  # noqa: D301
-    where = find_device(device)
-    check_targets(shape, output, plot)
-    screening = _screening(rho, single=bool(source or patch))
-    _check_sources(source, patch, patches)
-    if where is not None and (source or patch):
+    if device != "cpu" and (source or patch):
         msg = (
             f"--device {device}: single sources are solved on the processor, by elimination, "
             "since their logarithms need every digit; leave it out"
         )
         raise ParameterError(msg)
+    where = find_device(device)
+    check_targets(shape, output, plot)
+    screening = _screening(rho, single=bool(source or patch))
+    _check_sources(source, patch, patches)
     grid = {"voxels": voxels, "spacing": spacing, "inner_radius": inner_radius, "grid_spacing": grid_spacing}
     inside = {"threshold": threshold, "dark": dark, "label": label, "signed_distance": signed_distance}
     found = read_shape(shape, **grid, **inside, components=components)  # type: ignore[arg-type]

@@ -21,7 +21,7 @@ from spem.errors import MissingExtraError, ParameterError, SpemError
 from spem.fields.operator import System, assemble
 from spem.fields.solvers.batch import Batch
 from spem.fields.solvers.cuda.device import Cuda
-from spem.fields.solvers.engine import Backend
+from spem.fields.solvers.engine import Backend, require_backend
 from spem.fields.solvers.sweep import Sweep
 from spem.shapes.shape import Shape
 
@@ -66,13 +66,15 @@ def require_device(device: Backend) -> None:
     Raises
     ------
     MissingExtraError, ParameterError
-        When there is no such device, or it cannot be used; see `spem.fields.solvers.cuda.device.Cuda`.
+        When it is no device, there is none such, or it cannot be used; see
+        `spem.fields.solvers.cuda.device.Cuda`.
 
     Examples
     --------
     >>> from spem.fields.solvers.host import Host
     >>> require_device(Host())
     """
+    require_backend(device)
     if isinstance(device, Cuda):
         device.runtime()
 

@@ -192,3 +192,19 @@ def require_rho(system: System, rho: NDArray[np.float64]) -> None:
             "where fields vanish on every node; use a larger rho or a finer spacing"
         )
         raise ParameterError(msg)
+
+
+def require_backend(device: Any) -> None:
+    """Raise a `ParameterError` unless a device is a backend, or None for the processor.
+
+    Examples
+    --------
+    >>> require_backend("cuda")
+    Traceback (most recent call last):
+        ...
+    spem.errors.ParameterError: device='cuda': expected spem.Cuda() or another backend, None for the processor
+    """
+    if device is None or (not isinstance(device, type) and callable(getattr(device, "open", None))):
+        return
+    msg = f"device={device!r}: expected spem.Cuda() or another backend, None for the processor"
+    raise ParameterError(msg)

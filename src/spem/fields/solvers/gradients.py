@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spem.errors import ConvergenceError, ParameterError, SizeError
 from spem.fields.operator import System
-from spem.fields.solvers.engine import LANES, Backend, require_rho
+from spem.fields.solvers.engine import LANES, Backend, require_backend, require_rho
 from spem.fields.solvers.host import Host
 from spem.fields.solvers.protocol import Solution
 from spem.fields.solvers.refinement import Refined, refine
@@ -64,6 +64,7 @@ class MultigridGradients:
     device: Backend | None = None
 
     def __post_init__(self) -> None:
+        require_backend(self.device)
         if not 0 < self.rtol < 1:
             msg = f"rtol={self.rtol:g}: expected a tolerance between 0 and 1"
             raise ParameterError(msg)

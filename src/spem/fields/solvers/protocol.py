@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import ConvergenceError
+from spem.errors import ConvergenceError, ParameterError
 from spem.fields.operator import System
 
 
@@ -58,6 +58,21 @@ class Prepared(Protocol):
     def solve(self, rhs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solutions of right-hand sides ``(n_nodes,)`` or ``(n_nodes, k)``, in the same form."""
         ...
+
+
+def require_solver(solver: Any) -> None:
+    """Raise a `ParameterError` unless a solver is one, or None for that which is usual.
+
+    Examples
+    --------
+    >>> require_solver("multigrid")
+    Traceback (most recent call last):
+        ...
+    spem.errors.ParameterError: solver='multigrid': expected a solver, such as spem.MultigridGradients()
+    """
+    if solver is not None and (isinstance(solver, type) or not callable(getattr(solver, "solve", None))):
+        msg = f"solver={solver!r}: expected a solver, such as spem.MultigridGradients()"
+        raise ParameterError(msg)
 
 
 class SourceSolver(Solver, Protocol):

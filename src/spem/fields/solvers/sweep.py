@@ -17,7 +17,7 @@ from spem.errors import ParameterError, SizeError
 from spem.fields.hyperfield import Hyperfield
 from spem.fields.operator import System
 from spem.fields.solvers.batch import Batch
-from spem.fields.solvers.engine import Backend, Small, require_rho
+from spem.fields.solvers.engine import Backend, Small, require_backend, require_rho
 from spem.fields.solvers.host import Host
 from spem.fields.solvers.poles import Targets
 from spem.fields.solvers.protocol import Solution
@@ -68,6 +68,7 @@ class Sweep:
     device: Backend | None = None
 
     def __post_init__(self) -> None:
+        require_backend(self.device)
         if self.threads is not None and self.threads < 1:
             msg = f"threads={self.threads}: expected at least one thread"
             raise ParameterError(msg)

@@ -12,7 +12,7 @@ from spem.errors import ParameterError
 from spem.fields.boundary.sources import Sources
 from spem.fields.rho import single_rho
 from spem.fields.solvers.direct import Direct
-from spem.fields.solvers.protocol import Prepared, SourceSolver
+from spem.fields.solvers.protocol import Prepared, SourceSolver, require_solver
 from spem.fields.superposition.tails import logs, scaled, solve_tails
 
 # In units of the spacing: below it a field falls by more than 1e4 from node to node, and means nothing there,
@@ -108,8 +108,9 @@ def source_solver(solver: Any = None) -> SourceSolver:
     Raises
     ------
     ParameterError
-        If it takes no right-hand sides but b.
+        If it is no solver, or takes no right-hand sides but b.
     """
+    require_solver(solver)
     if solver is None:
         return Direct()
     if not hasattr(solver, "prepare"):

@@ -117,12 +117,12 @@ def parse_device(text: str) -> Backend | None:
     >>> parse_device("gpu")
     Traceback (most recent call last):
         ...
-    spem.errors.ParameterError: device: expected cpu, cuda or cuda:NUMBER, got 'gpu'
+    spem.errors.ParameterError: --device gpu: expected cpu, cuda or cuda:NUMBER; see spem devices
     """
     if text == "cpu":
         return None
     match = re.fullmatch(r"cuda(?::([0-9]+))?", text)
     if match is None:
-        msg = f"device: expected cpu, cuda or cuda:NUMBER, got {text!r}"
+        msg = f"--device {text}: expected cpu, cuda or cuda:NUMBER; see spem devices"
         raise ParameterError(msg)
     return Cuda(int(match[1] or 0))
