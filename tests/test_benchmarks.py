@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from backends import missing
+from backends import needs_simulator
 from simulator import SimulatedRuntime
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
@@ -160,7 +160,7 @@ def test_a_section_that_fails_ends_no_other(tmp_path, monkeypatch):
     assert list(kept["tables"]) == ["good"]
 
 
-@pytest.mark.skipif(missing("simulated") is not None, reason=str(missing("simulated")))
+@needs_simulator
 def test_gpu_side_is_measured_beside_the_processor(tmp_path, monkeypatch):
     """With a device, here a simulated one, each table has its rows, and kernels have one of their own."""
     monkeypatch.syspath_prepend(str(FOLDER))

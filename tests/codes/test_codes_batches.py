@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from backends import needs_simulator
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -89,6 +90,7 @@ def test_batches_are_whole_and_no_larger_than_wanted(counts: list[int], most: in
         assert len(places) == 1 or sum(counts[place] + 256 for place in places) <= most
 
 
+@needs_simulator
 @pytest.mark.parametrize(
     "settings",
     [
@@ -105,6 +107,7 @@ def test_codes_are_those_of_the_host(shapes: list[Shape], others: list[Shape], s
     assert np.linalg.norm(host - device, axis=1).max() < 1e-4
 
 
+@needs_simulator
 def test_codes_of_solids_are_those_of_the_host() -> None:
     """Solids are coded alike."""
     solids = [spem.synthetic.ball(1.0, 0.16), spem.synthetic.ball(1.0, 0.19)]
@@ -119,6 +122,7 @@ def test_host_as_a_device_changes_nothing(shapes: list[Shape]) -> None:
         np.testing.assert_array_equal(bands[0], shape_features(shape, SETTINGS)[0])
 
 
+@needs_simulator
 @pytest.mark.parametrize("order", ["backward", "shuffled"])
 def test_neither_batch_nor_order_changes_a_bit(shapes: list[Shape], model: Model, order: str) -> None:
     """A shape has the same features and code alone as in a batch, in any order of blocks and threads."""
@@ -129,6 +133,7 @@ def test_neither_batch_nor_order_changes_a_bit(shapes: list[Shape], model: Model
         np.testing.assert_array_equal(features_of([shape], SETTINGS, device=Simulated())[0][0], bands[0])
 
 
+@needs_simulator
 def test_joined_codes_have_the_other_kinds_of_the_host(shapes: list[Shape], others: list[Shape]) -> None:
     """Of several kinds only SPEM maps are made on the device."""
     settings = Settings(features="spem+sources", voxels=None, n_centers=8)
@@ -157,6 +162,7 @@ def test_single_shape_that_does_not_fit_fails_with_its_sizes(shapes: list[Shape]
         encode_shapes(shapes, model, device=device)
 
 
+@needs_simulator
 def test_maps_that_do_not_fit_beside_fields_are_a_size_error(shapes: list[Shape], model: Model) -> None:
     """Memory that runs out after the sweep is told with what took it."""
     runtime = SimulatedRuntime()
@@ -174,6 +180,7 @@ def test_maps_that_do_not_fit_beside_fields_are_a_size_error(shapes: list[Shape]
             batch_features(batch, SETTINGS, kept)
 
 
+@needs_simulator
 def test_maps_that_are_not_finite_are_refused(shapes: list[Shape], model: Model) -> None:
     """Codes are never made of what is no number."""
     with Sweep(device=Simulated()).batch(*zip(*map(ready, shapes[:1]), strict=True)) as batch:
@@ -207,6 +214,7 @@ def test_missing_device_is_told_at_once(shapes: list[Shape], model: Model) -> No
         list(part_codes(shapes, model.parts[0], device=Missing()))
 
 
+@needs_simulator
 def test_sweep_that_misses_its_tolerance_costs_one_shape(
     shapes: list[Shape], model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -247,6 +255,7 @@ def test_shapes_of_several_dimensions_are_refused(shapes: list[Shape]) -> None:
         features_of([shapes[0], spem.synthetic.ball(1.0, 0.3)], SETTINGS, device=Host())
 
 
+@needs_simulator
 def test_maps_of_an_interval() -> None:
     """Shapes of one dimension have the maps of the host."""
     shape = spem.synthetic.interval(1.0, 0.01)

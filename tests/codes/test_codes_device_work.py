@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from backends import needs_simulator
 from simulator import Simulated
 
 import spem
@@ -63,6 +64,7 @@ def test_collection_with_a_device_is_that_without(folder: Path, whole: Codes, n_
     assert (codes.names, codes.hashes) == (whole.names, whole.hashes)
 
 
+@needs_simulator
 def test_collection_on_the_simulator_has_the_codes_of_the_host(folder: Path) -> None:
     """With a given model a device makes the codes of the host to 1e-4."""
     settings = Settings.paper(voxels=None, n_maps=3, n_centers=4)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from backends import needs_simulator
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulator import SimulatedRuntime
@@ -18,6 +19,8 @@ from spem.codes.vocabulary import Residuals, sum_residuals
 from spem.codes.word_sums import Rows, WordSums
 from spem.errors import ParameterError
 from spem.fields.solvers.cuda.layout import Layout
+
+pytestmark = needs_simulator
 
 Counts = tuple[tuple[int, int], ...]
 # Red and black nodes: two chunks, a tile of each colour, one node.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from backends import missing
+from backends import needs_simulator
 from simulator import Simulated
 
 from spem.errors import ParameterError, SizeError
@@ -101,7 +101,7 @@ def test_labels_are_told_apart(tmp_path):
     assert [failure.reason for failure in added.failures] == ["1: 676 nodes do not fit"]
 
 
-@pytest.mark.skipif(missing("simulated") is not None, reason=str(missing("simulated")))
+@needs_simulator
 def test_codes_of_kernels_find_the_same(folder, tmp_path):
     """Of a device that computes by itself codes differ by rounding, and answers come in the same order."""
     one, other = Index.open(tmp_path / "one.db"), Index.open(tmp_path / "other.db")

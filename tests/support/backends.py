@@ -38,3 +38,7 @@ def missing(name: str) -> str | None:
         except SpemError as error:
             return f"no CUDA device: {error}"
     return None
+
+
+#: For tests that run kernels in the simulator by themselves.
+needs_simulator = pytest.mark.skipif(missing("simulated") is not None, reason=str(missing("simulated")))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from backends import DEVICES, use_backend
+from backends import DEVICES, needs_simulator, use_backend
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -178,6 +178,7 @@ def test_kernels_take_a_shift_a_lane(name):
     assert np.abs(solution.values - Direct().solve(system, rho).values).max() < 1e-8
 
 
+@needs_simulator
 def test_the_memory_of_the_simulator_sets_the_batch(sources, rhs):
     """A device that opens three groups and cannot load them takes fewer at a time, to the same bits."""
     system, memory = sources.system, 1 << 19

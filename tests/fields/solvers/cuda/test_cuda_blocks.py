@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from backends import missing
+from backends import needs_simulator
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from simulator import SimulatedRuntime
@@ -19,7 +19,7 @@ from spem.fields.solvers.engine import LANES, Small
 from spem.shapes import synthetic
 from spem.shapes.shape import Shape
 
-pytestmark = pytest.mark.skipif(missing("simulated") is not None, reason=str(missing("simulated")))
+pytestmark = needs_simulator
 
 DTYPES = [np.float32, np.float64]
 

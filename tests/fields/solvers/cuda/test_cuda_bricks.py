@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from backends import needs_simulator
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from simulator import SimulatedRuntime
@@ -13,6 +14,8 @@ from spem.fields.solvers.cuda.bricks import brick_side, first_cells, lay_out
 from spem.fields.solvers.cuda.levels import Hierarchy
 from spem.fields.solvers.cuda.runtime import TILE
 from spem.shapes.shape import Shape
+
+pytestmark = needs_simulator
 
 
 @settings(max_examples=20, deadline=None)

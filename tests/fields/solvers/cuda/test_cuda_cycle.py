@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from backends import needs_simulator
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulator import SimulatedRuntime
@@ -15,6 +16,8 @@ from spem.fields.solvers.cuda.programs import read_source
 from spem.fields.solvers.engine import LANES
 from spem.fields.solvers.multigrid import COARSEST
 from spem.shapes.shape import Shape
+
+pytestmark = needs_simulator
 
 SHIFTS = np.geomspace(1e-3, 10.0, LANES)
 

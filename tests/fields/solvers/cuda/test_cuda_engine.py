@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from backends import missing
+from backends import needs_simulator
 from simulator import Simulated, SimulatedRuntime
 from simulator.runtime import DeviceMemoryError
 
@@ -22,7 +22,7 @@ from spem.fields.solvers.sweep import Sweep
 from spem.shapes import synthetic
 from spem.shapes.shape import Shape
 
-pytestmark = pytest.mark.skipif(missing("simulated") is not None, reason=str(missing("simulated")))
+pytestmark = needs_simulator
 
 RHO = np.geomspace(0.5, 20.0, 16)
 SHIFTS = np.geomspace(1e-2, 4.0, LANES)

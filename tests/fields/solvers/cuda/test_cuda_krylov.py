@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from backends import needs_simulator
 from simulator import SimulatedRuntime
 
 from spem.fields.operator import assemble
@@ -14,6 +15,8 @@ from spem.fields.solvers.cuda.levels import Hierarchy
 from spem.fields.solvers.engine import LANES
 from spem.fields.solvers.host import HostEngine
 from spem.shapes.shape import Shape
+
+pytestmark = needs_simulator
 
 SHIFTS = np.geomspace(1e-3, 10.0, LANES)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from backends import needs_simulator
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulator import SimulatedRuntime
@@ -11,6 +12,8 @@ from simulator import SimulatedRuntime
 from spem.errors import SizeError
 from spem.fields.solvers.cuda.layout import Layout
 from spem.fields.solvers.cuda.runtime import TILE
+
+pytestmark = needs_simulator
 
 few = st.integers(0, 3 * TILE)
 counts_of_systems = st.lists(st.tuples(few, few), min_size=1, max_size=6).map(np.array)

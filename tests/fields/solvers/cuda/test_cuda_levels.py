@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from backends import needs_simulator
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulator import SimulatedRuntime
@@ -15,6 +16,8 @@ from spem.fields.solvers.cuda.footprint import hierarchy_bytes
 from spem.fields.solvers.cuda.levels import Hierarchy
 from spem.fields.solvers.cuda.runtime import TILE
 from spem.shapes.shape import Cuts, Shape
+
+pytestmark = needs_simulator
 
 LONGEST = {1: 700, 2: 40, 3: 13, 4: 6}
 SIEVE = np.random.default_rng(0).random((120, 120)) < 0.3

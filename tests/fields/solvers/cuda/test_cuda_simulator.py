@@ -7,15 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from backends import needs_simulator
 from simulator import SimulatedRuntime, arrays
-from simulator.compiler import find_compiler, find_sanitizer, spawn_sanitized
+from simulator.compiler import find_sanitizer, spawn_sanitized
 from simulator.memory import FaultError
 
 from spem.fields.solvers.cuda.programs import kernels, read_source
 from spem.fields.solvers.cuda.runtime import THREADS, TILE, Runtime
 from spem.fields.solvers.engine import LANES
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="the simulator needs g++ or clang++ on Linux")
+pytestmark = needs_simulator
 
 ZEROS = np.zeros(THREADS, np.float32)
 ORDERS = ("forward", "backward", "shuffled")
