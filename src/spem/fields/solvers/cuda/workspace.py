@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from spem.errors import ParameterError, SizeError
 from spem.fields.operator import System
 from spem.fields.solvers.cuda.blocks import Blocks
+from spem.fields.solvers.cuda.bricks import first_cells
 from spem.fields.solvers.cuda.cycle import Cycle
 from spem.fields.solvers.cuda.footprint import hierarchy_bytes
 from spem.fields.solvers.cuda.krylov import Krylov, Vectors
@@ -25,6 +26,8 @@ from spem.fields.solvers.multigrid import COARSEST
 EXPECTED_BLOCKS = 3
 # Kernels multiply the number of a row by that of its faces, or corners, in 32 bits.
 _MOST_ENTRIES = 2**31
+# CuPy sums up no more numbers than that, and says nothing.
+_MOST_CELLS = 2**31
 
 
 class Sources(NamedTuple):
@@ -118,7 +121,7 @@ def count_rows(counts: Sequence[int] | NDArray[np.int64]) -> int:
 
 
 def require_batch(systems: Sequence[System]) -> None:
-    """Refuse what no batch can be made of, and more rows than kernels can number."""
+    """Refuse what no batch can be made of, and more rows, or cells of grids, than can be numbered."""
     dimensions = sorted({system.shape.ndim for system in systems})
     if len(dimensions) != 1:
         msg = f"a batch of shapes of dimensions {dimensions}: expected shapes, all of one dimension"
@@ -129,6 +132,14 @@ def require_batch(systems: Sequence[System]) -> None:
         msg = (
             f"{told(len(systems), n_nodes)}: a device takes at most {most:,} in {d}-D; "
             "sweep fewer shapes at a time, or coarser ones"
+        )
+        raise SizeError(msg)
+    grid = np.array([system.shape.mask.shape for system in systems])
+    cells = int(first_cells(grid, np.ones(len(grid), np.bool_))[-1])
+    if cells >= _MOST_CELLS:
+        msg = (
+            f"{told(len(systems), n_nodes)} in grids of {cells:,} voxels: a device takes fewer than "
+            f"{_MOST_CELLS:,}; sweep fewer shapes at a time, or coarser ones"
         )
         raise SizeError(msg)
 
