@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,14 @@ from backends import needs_simulator
 from simulator import Simulated
 
 import spem
-from spem.codes import drafts
+from spem.codes import device_work, drafts
 from spem.codes.codes import Codes
 from spem.codes.collection import encode_collection, encode_file
 from spem.codes.drafts import draft_shapes, load_drafts, save_drafts
 from spem.codes.settings import Settings
 from spem.codes.sources import find_files
 from spem.codes.work import Work, clear_work
+from spem.codes.workers import run_all
 from spem.errors import ReadError, SizeError
 from spem.fields.solvers.host import Host
 from spem.shapes.shape import Shape
@@ -111,6 +113,24 @@ def test_interrupted_on_the_device_goes_on_without_reading_again(
     assert not list(work.rglob("*.draft.work"))
     clear_work(work)
     assert not work.exists()
+
+
+def test_what_fails_on_the_device_ends_the_readers(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A batch that ends the work does not leave processes reading what nobody waits for."""
+    ended: list[bool] = []
+
+    def run(*arguments: Any) -> Iterator[Any]:
+        try:
+            yield from run_all(*arguments)
+        finally:
+            ended.append(True)
+
+    monkeypatch.setattr(device_work, "run_all", run)
+    monkeypatch.setattr(device_work, "BATCH_NODES", 1)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        encode_collection(find_files([folder]), SETTINGS, device=Broken())
+    assert caught.traceback
+    assert ended == [True]
 
 
 @pytest.mark.parametrize("first", [None, Host()])
