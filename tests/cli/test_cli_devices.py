@@ -21,7 +21,7 @@ Spem = Callable[..., Result]
 Refused = Callable[..., None]
 ABSENT = {
     "CuPy is not installed; it comes with pip install 'spem[cuda]'": MissingExtraError,
-    "no NVIDIA driver is installed here; install one, or leave the device to the CPU": ParameterError,
+    "no NVIDIA driver is found here; install one, give a container its GPUs, or leave out the device": ParameterError,
     "no CUDA device 0; there are: none": ParameterError,
 }
 

@@ -21,7 +21,7 @@ cuda.get_elapsed_time cuda.MemoryPool.get_limit cuda.MemoryPool.used_bytes
 cuda.MemoryPool.free_bytes cuda.MemoryPool.free_all_blocks cuda.PinnedMemoryPool.free_all_blocks
 cuda.MemoryPointer.ptr cuda.driver.CUDADriverError cuda.runtime.CUDARuntimeError
 cuda.runtime.driverGetVersion cuda.runtime.runtimeGetVersion cuda.runtime.getDeviceCount
-cuda.runtime.getDeviceProperties
+cuda.runtime.getDeviceProperties cuda.nvrtc.getVersion
 """
 
 

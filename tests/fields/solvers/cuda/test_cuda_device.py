@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import pytest
 
 import spem
 from spem.errors import MissingExtraError, ParameterError
-from spem.fields.solvers.cuda.cupy_runtime import require_device
+from spem.fields.solvers.cuda.cupy_runtime import require_compiler, require_device
 from spem.fields.solvers.cuda.device import Cuda, parse_device
 
 
@@ -78,7 +79,7 @@ def test_a_device_that_works_is_taken() -> None:
 @pytest.mark.parametrize(
     ("driver", "index", "kind", "words"),
     [
-        (Driver(version=0), 0, ParameterError, "no NVIDIA driver is installed here"),
+        (Driver(version=0), 0, ParameterError, "no NVIDIA driver is found here"),
         (Driver(names=None), 0, ParameterError, "no CUDA device can be used: cudaErrorNoDevice"),
         (Driver(names=[]), 0, ParameterError, "no CUDA device 0; there are: none"),
         (Driver(), 2, ParameterError, "no CUDA device 2; there are: 0 NVIDIA H200, 1 NVIDIA T4$"),
@@ -95,6 +96,18 @@ def test_devices_that_cannot_be_used(driver: Driver, index: int, kind: type[Exce
     with pytest.raises(kind, match=f"^{words}") as caught:
         require_device(driver, index)
     assert "\n" not in str(caught.value)
+
+
+def test_cupy_without_its_compiler() -> None:
+    """A CuPy installed by itself lacks NVRTC; the command that brings it is named."""
+
+    def lost() -> tuple[int, int]:
+        msg = 'Failure finding "libnvrtc.so.13"\nNo such file'
+        raise RuntimeError(msg)
+
+    require_compiler(SimpleNamespace(getVersion=lambda: (13, 0)))
+    with pytest.raises(MissingExtraError, match=r"^CuPy finds no compiler .* pip install 'spem\[cuda\]'.*$"):
+        require_compiler(SimpleNamespace(getVersion=lost))
 
 
 def test_cupy_that_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,8 @@ from spem.errors import MissingExtraError, ParameterError
 from spem.fields.solvers.cuda.programs import kernels, options, read_source
 from spem.fields.solvers.cuda.runtime import THREADS, Array
 
+# Oldest CUDA that there is an extra of spem for.
+_OLDEST_EXTRA = 12
 # cudaErrorMemoryAllocation and CUDA_ERROR_OUT_OF_MEMORY
 _OUT_OF_MEMORY = 2
 
@@ -24,7 +26,7 @@ def load_cupy(index: int) -> Any:
     Raises
     ------
     MissingExtraError
-        When CuPy is not installed, or made for a later CUDA than the driver's.
+        When CuPy is not installed, made for a later CUDA than the driver's, or without its compiler.
     ParameterError
         When there is no driver, no device, or none of this number.
     """
@@ -36,26 +38,38 @@ def load_cupy(index: int) -> Any:
         msg = f"CuPy is {state}; it comes with pip install 'spem[cuda]'"
         raise MissingExtraError(msg) from error
     require_device(cupy.cuda.runtime, index)
+    require_compiler(cupy.cuda.nvrtc)
     return cupy
+
+
+def require_compiler(nvrtc: Any) -> None:
+    """Raise a one-line error, as `load_cupy` does, unless ``cupy.cuda.nvrtc`` finds its library."""
+    try:
+        nvrtc.getVersion()
+    except (ImportError, OSError, RuntimeError) as error:
+        msg = "CuPy finds no compiler (NVRTC); it comes with pip install 'spem[cuda]', 'spem[cuda12]' for CUDA 12"
+        raise MissingExtraError(msg) from error
 
 
 def require_device(driver: Any, index: int) -> None:
     """Raise a one-line error, as `load_cupy` does, unless ``cupy.cuda.runtime`` can use a device."""
     version, wanted = driver.driverGetVersion(), driver.runtimeGetVersion()
     if version == 0:
-        msg = "no NVIDIA driver is installed here; install one, or leave the device to the CPU"
+        msg = (
+            "no NVIDIA driver is found here; install one, give a container its GPUs, or leave out the device"
+        )
         raise ParameterError(msg)
     if version // 1000 < wanted // 1000:
         major, minor = version // 1000, version % 1000 // 10
-        msg = (
-            f"CuPy is for CUDA {wanted // 1000}, the driver for CUDA {major}.{minor}: update the driver, or "
-            f"pip uninstall cupy-cuda{wanted // 1000}x and pip install 'spem[cuda{major}]'"
-        )
+        msg = f"CuPy is for CUDA {wanted // 1000}, the driver for CUDA {major}.{minor}: update the driver"
+        if major >= _OLDEST_EXTRA:
+            old = f"cupy-cuda{wanted // 1000}x"
+            msg += f", or pip uninstall {old} and pip install 'spem[cuda{major}]'"
         raise MissingExtraError(msg)
     try:
         count = driver.getDeviceCount()
     except driver.CUDARuntimeError as error:
-        msg = f"no CUDA device can be used: {error}; leave the device to the CPU"
+        msg = f"no CUDA device can be used: {error}; leave out the device"
         raise ParameterError(msg) from error
     if not 0 <= index < count:
         names = [driver.getDeviceProperties(number)["name"].decode() for number in range(count)]
