@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from spem.cli.options import Device, Jobs, Json, find_device
+from spem.cli.options import Device, Jobs, Json, find_device, tell_idle_device
 from spem.cli.output import check_target, complain, counted, print_json
 from spem.cli.progress import Bar
 from spem.cli.settings_options import with_settings
@@ -53,7 +53,8 @@ def encode(
     shape a label, with its size: --per-label where a segmentation does not look like one. Solids are coded by
     SPEM maps and surface, silhouettes by boundary sources and contours, unless --features says otherwise:
     kinds joined by +, of spem, surface, sources, shape-context, inner-distance,
-    surface-wks, surface-si-hks, surface-hks, wks, si-hks, hks. Settings of maps need spem.
+    surface-wks, surface-si-hks, surface-hks, wks, si-hks, hks. Settings of maps need spem, and
+    it alone is made on --device.
     Files that fail are told, one line each, and the others saved. When CODES is there already, new files are
     added with its vocabulary and settings, and what has not changed is reused. An interrupted run goes on
     from CODES.work when the same command is given again.
@@ -87,6 +88,7 @@ def encode(
         jobs=jobs,
         device=where,
     )
+    tell_idle_device(device, codes.model.settings.features)
     if save_vocabulary is not None:
         codes.model.save(save_vocabulary)
     _tell(output, codes, failures, json=json)
@@ -158,11 +160,7 @@ def encode_paths(
         msg = f"{output}: is {kind_of(output)}, not spem codes; write to another file"
         raise ParameterError(msg)
     known = Codes.load(output) if output.exists() and not overwrite else None
-    model = load_model(vocabulary) if vocabulary is not None else None
-    if known is not None and model is not None and model.digest != known.model.digest:
-        msg = f"{output}: is there already, made with another vocabulary than {vocabulary}; give --overwrite"
-        raise ModelError(msg)
-    model = known.model if known is not None else model
+    model = _vocabulary(vocabulary, known, output)
     settings = _settings(options, model, output if known is not None else vocabulary, paper=paper)
     work = output.with_name(output.name + ".work")
     with Bar() as bar:
@@ -192,6 +190,17 @@ def encode_paths(
             raise KeyboardInterrupt(msg) from None
     clear_work(work)
     return codes, failures
+
+
+def _vocabulary(vocabulary: Path | None, known: Codes | None, output: Path) -> Model | None:
+    """Return the model to reuse, if any: that of the codes that are there, and no other."""
+    model = load_model(vocabulary) if vocabulary is not None else None
+    if known is None:
+        return model
+    if model is not None and model.digest != known.model.digest:
+        msg = f"{output}: is there already, made with another vocabulary than {vocabulary}; give --overwrite"
+        raise ModelError(msg)
+    return known.model
 
 
 def _present(codes: Codes, paths: list[str], output: Path, *, prune: bool) -> Codes:
