@@ -21,7 +21,7 @@ Spem = Callable[..., Result]
 Refused = Callable[..., None]
 ABSENT = {
     "CuPy is not installed; it comes with pip install 'spem[cuda]'": MissingExtraError,
-    "no NVIDIA driver is found here; install one, give a container its GPUs, or leave out the device": ParameterError,
+    "no NVIDIA driver here: install one, give a container its GPUs, or take no device": ParameterError,
     "no CUDA device 0; there are: none": ParameterError,
 }
 
@@ -127,3 +127,16 @@ def test_collections_run_on_the_device(spem: Spem, folder: Path, tmp_path: Path,
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["model"] == Codes.load(here).model.digest
     assert set(present) == {0, 1}
+
+
+def test_a_device_without_work_is_told(spem: Spem, folder: Path, tmp_path: Path, present: list[int]) -> None:
+    """Features that no device makes are made all the same, with one line that says so."""
+    for command in (
+        ("encode", folder, "-o", tmp_path / "codes.spem"),
+        ("index", "add", tmp_path / "db", folder),
+    ):
+        options = ("--own-grid", "--features", "hks", "--n-centers", "4")
+        result = spem(*command, *options, "--device", "cuda")
+        assert result.exit_code == 0, result.stderr
+        assert "--device cuda: not used by features hks; --features spem is made there\n" in result.stderr
+        assert "--device" not in spem(*command, *options).stderr

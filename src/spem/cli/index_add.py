@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spem.cli.index import Address, parse_metadata
-from spem.cli.options import Device, Jobs, Json, find_device
+from spem.cli.options import Device, Jobs, Json, find_device, tell_idle_device
 from spem.cli.output import complain, counted, print_json
 from spem.cli.progress import Bar
 from spem.cli.settings_options import with_settings
@@ -79,6 +79,7 @@ def add(
       spem index add shapes.db shapes/ --labels shapes/labels.csv --meta site=Oslo
       spem index add shapes.db shapes/ --prune                   follows a folder
       spem index add shapes.db solids/ --new-model               solids beside silhouettes
+      spem index add shapes.db solids/ --device cuda             maps on a GPU
       spem index add s3://bucket/shapes scans/ --cluster tcp://head:8786
     """  # noqa: D301
     from spem.codes.settings import Settings
@@ -118,6 +119,8 @@ def add(
         except KeyboardInterrupt:
             msg = f"interrupted; what is done is kept in {db}: give the same command again to go on"
             raise KeyboardInterrupt(msg) from None
+    if where is not None:
+        tell_idle_device(device, index.model(added.model).settings.features)
     _tell(index, added, paths, json=json)
     if added.failures:
         raise typer.Exit(1)

@@ -133,6 +133,22 @@ def find_device(text: str) -> Backend | None:
     return device
 
 
+def tell_idle_device(text: str, features: str) -> None:
+    """Say so when a device was asked for, and codes have no features that are made on one.
+
+    Parameters
+    ----------
+    text
+        As for `find_device`.
+    features
+        Kinds of features, joined by +.
+    """
+    from spem.codes.batches import ON_DEVICE
+
+    if text != "cpu" and ON_DEVICE not in features.split("+"):
+        complain(f"--device {text}: not used by features {features}; --features {ON_DEVICE} is made there")
+
+
 def read_shape(
     path: str,
     *,
