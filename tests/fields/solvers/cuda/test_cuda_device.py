@@ -79,10 +79,16 @@ def test_a_device_that_works_is_taken() -> None:
 @pytest.mark.parametrize(
     ("driver", "index", "kind", "words"),
     [
-        (Driver(version=0), 0, ParameterError, "no NVIDIA driver is found here"),
+        (Driver(version=0), 0, ParameterError, "no NVIDIA driver here"),
         (Driver(names=None), 0, ParameterError, "no CUDA device can be used: cudaErrorNoDevice"),
         (Driver(names=[]), 0, ParameterError, "no CUDA device 0; there are: none"),
         (Driver(), 2, ParameterError, "no CUDA device 2; there are: 0 NVIDIA H200, 1 NVIDIA T4$"),
+        (
+            Driver(version=11080),
+            0,
+            MissingExtraError,
+            r"CuPy is for CUDA 13, the driver for CUDA 11\.8: update the driver$",
+        ),
         (
             Driver(version=12040),
             0,

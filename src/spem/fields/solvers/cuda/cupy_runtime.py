@@ -47,7 +47,7 @@ def require_compiler(nvrtc: Any) -> None:
     try:
         nvrtc.getVersion()
     except (ImportError, OSError, RuntimeError) as error:
-        msg = "CuPy finds no compiler (NVRTC); it comes with pip install 'spem[cuda]', 'spem[cuda12]' for CUDA 12"
+        msg = "CuPy finds no compiler (NVRTC); it comes with pip install 'spem[cuda]' or 'spem[cuda12]'"
         raise MissingExtraError(msg) from error
 
 
@@ -55,9 +55,7 @@ def require_device(driver: Any, index: int) -> None:
     """Raise a one-line error, as `load_cupy` does, unless ``cupy.cuda.runtime`` can use a device."""
     version, wanted = driver.driverGetVersion(), driver.runtimeGetVersion()
     if version == 0:
-        msg = (
-            "no NVIDIA driver is found here; install one, give a container its GPUs, or leave out the device"
-        )
+        msg = "no NVIDIA driver here: install one, give a container its GPUs, or take no device"
         raise ParameterError(msg)
     if version // 1000 < wanted // 1000:
         major, minor = version // 1000, version % 1000 // 10
@@ -69,7 +67,7 @@ def require_device(driver: Any, index: int) -> None:
     try:
         count = driver.getDeviceCount()
     except driver.CUDARuntimeError as error:
-        msg = f"no CUDA device can be used: {error}; leave out the device"
+        msg = f"no CUDA device can be used: {error}; take no device"
         raise ParameterError(msg) from error
     if not 0 <= index < count:
         names = [driver.getDeviceProperties(number)["name"].decode() for number in range(count)]
