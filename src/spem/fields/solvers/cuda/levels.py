@@ -14,6 +14,7 @@ from spem.fields.operator import System
 from spem.fields.solvers.cuda.bricks import brick_side, first_cells, lay_out
 from spem.fields.solvers.cuda.layout import Layout
 from spem.fields.solvers.cuda.runtime import THREADS, Program, Runtime
+from spem.fields.solvers.cuda.uploads import upload_joined
 from spem.fields.solvers.multigrid import COARSEST
 
 
@@ -177,7 +178,7 @@ class _Batch:
         runtime, n = self.runtime, np.int64(self.n_nodes)
         grid = np.array([system.shape.mask.shape for system in self.systems], np.int32)
         first_cell = first_cells(grid, np.ones(len(grid), np.bool_))
-        voxels = runtime.upload(_joined([system.shape.voxels for system in self.systems]))
+        voxels = upload_joined(runtime, (system.shape.voxels for system in self.systems), self.n_nodes)
         brick = np.int32(brick_side(grid.shape[1]))
         where = voxels, first, runtime.upload(grid), runtime.upload(first_cell), brick
         sizes = np.int32(len(grid)), n
@@ -193,7 +194,7 @@ class _Batch:
     def _neighbours(self, layout: Layout, rows: Any, first: Any) -> Any:
         """Neighbour table of the finest level."""
         runtime, n, dummy = self.runtime, self.n_nodes, np.int32(layout.n_rows)
-        found = runtime.upload(_joined([system.domain.neighbours for system in self.systems]))
+        found = upload_joined(runtime, (system.domain.neighbours for system in self.systems), n)
         width = found.shape[1]
         table = _filled(runtime, (layout.n_rows, width), np.int32, layout.n_rows)
         n_systems = np.int32(len(self.systems))
@@ -210,12 +211,11 @@ class _Batch:
     ) -> tuple[Any, Any]:
         """Values of nodes, scaled, by rows: in double and in single precision."""
         runtime, n = self.runtime, self.n_nodes
-        host = np.empty(n)
-        for b, (value, factor) in enumerate(zip(values, scale, strict=True)):
-            np.multiply(value, factor, out=host[self.first_node[b] : self.first_node[b + 1]])
+        scaled = (value * factor for value, factor in zip(values, scale, strict=True))
+        table = upload_joined(runtime, scaled, n)
         exact = _filled(runtime, (layout.n_rows,), np.float64, padding)
         rounded = _filled(runtime, (layout.n_rows,), np.float32, padding)
-        self._launch("place_values", n, runtime.upload(host), rows, np.int64(n), exact, rounded)
+        self._launch("place_values", n, table, rows, np.int64(n), exact, rounded)
         return exact, rounded
 
     def coarsen(self, fine: Level, stage: _Stage, large: NDArray[np.bool_]) -> tuple[Level, Level, _Stage]:
@@ -265,8 +265,3 @@ def _filled(runtime: Runtime, shape: tuple[int, ...], dtype: Any, value: int) ->
     array = runtime.empty(shape, dtype)
     array[...] = value
     return array
-
-
-def _joined(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """Arrays end to end; one alone is not copied."""
-    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
