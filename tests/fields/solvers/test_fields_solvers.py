@@ -155,6 +155,26 @@ def test_sweep_over_twelve_decades(rtol):
     assert np.abs(field.fields() - exact).max() < rtol
 
 
+def test_sweep_far_below_the_spacing_keeps_its_tolerance_beside_cut_edges():
+    """Edges cut to all lengths down to a millionth have fields that vary at every ρ, however small."""
+    rng = np.random.default_rng(0)
+    whole = Shape.from_mask(rng.random((6, 6, 6)) < 0.6)
+    node, direction = np.nonzero(assemble(whole).domain.neighbours == whole.n_nodes)
+    cuts = Cuts(whole.voxels[node], direction.astype(np.uint8), 10.0 ** rng.uniform(-6, 0, node.size))
+    system = assemble(Shape(whole.mask, whole.spacing, whole.origin, "grains", cuts))
+    rho = np.geomspace(1e-3, 100, 200)
+    exact = Direct().solve(system, rho).values
+    assert np.abs(Sweep().hyperfield(system, rho).fields() - exact).max() < 1e-6
+
+
+def test_a_tolerance_that_single_precision_cannot_hold_is_kept_in_double():
+    """Columns are stored in single precision only where their rounding fits into the tolerance."""
+    system, rho = assemble(Shape.from_mask(np.ones(770)), "voxel"), np.linspace(0.5, 40, 64)
+    field = Sweep(rtol=3.1e-7).hyperfield(system, rho)
+    assert field.error <= 3.1e-7
+    assert np.abs(field.fields() - Direct().solve(system, rho).values).max() < 3.1e-7
+
+
 @pytest.mark.parametrize("fraction", [1e-6, 1e-3, 1.0])
 def test_edges_cut_short_cost_no_digits(fraction):
     """A surface a millionth of an edge from the nodes leaves a field that is right to 1e-10."""
