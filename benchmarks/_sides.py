@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 import statistics
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,6 +22,7 @@ from spem.fields.solvers.cuda.device import Cuda
 from spem.fields.solvers.engine import Backend
 from spem.fields.solvers.host import Host
 from spem.fields.solvers.sweep import Sweep
+from spem.fields.solvers.team import usable_threads
 from spem.shapes.shape import Shape
 
 N_MAPS = 6
@@ -158,8 +160,8 @@ def run(
     """Sweep shapes together, and take all fields and maps."""
     rho = [sample_rho(shape.size, count=n_rho) for shape in shapes]
     clock = Clock()
-    with clock.stage("assemble"):
-        systems = [assemble(shape) for shape in shapes]
+    with clock.stage("assemble"), ThreadPoolExecutor(usable_threads()) as pool:
+        systems = list(pool.map(assemble, shapes))
     sweep = Sweep(device=Watch(side.backend(profile=profile), clock))
     with sweep.batch(systems, rho) as batch:
         fields, maps = side.project(batch, clock, fetch)
