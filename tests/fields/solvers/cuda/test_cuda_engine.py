@@ -250,7 +250,7 @@ def test_too_large_a_batch_is_refused_before_anything_is_allocated() -> None:
     """A batch over the free memory, or over 32-bit numbers, is refused with its sizes; halves may do."""
     systems = BATCHES["2-D"]
     small = Simulated(memory=engine_bytes(systems, np.float32, 3) - 1)
-    message = r"3 shapes of 349 nodes with 24 columns would take .* MiB on the simulator, which has .* MiB free"
+    message = r"3 shapes of 349 nodes with 24 columns would take .* MiB on the simulator, which has .* free"
     with pytest.raises(SizeError, match=message):
         small.open(systems, np.float32)
     fields = Sweep(device=small).hyperfields(systems, [RHO] * 3)
