@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from backends import DEVICES, use_backend
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -49,9 +52,19 @@ def blob(seed: int = 0) -> Shape:
     return Shape(shape.mask, shape.spacing, shape.origin, "blob", cuts)
 
 
-@pytest.fixture(params=SOLVERS)
+# Those that run on devices too, in the simulator of one and on one.
+ON_DEVICES = [
+    pytest.param((solver, device.values[0]), marks=device.marks, id=f"{solver} {device.values[0]}")
+    for solver in ("multigrid", "sweep")
+    for device in DEVICES
+]
+
+
+@pytest.fixture(params=[*(pytest.param((name, "host"), id=name) for name in SOLVERS), *ON_DEVICES])
 def solver(request):
-    return SOLVERS[request.param]
+    name, device = request.param
+    found = SOLVERS[name]
+    return found if device == "host" else replace(found, device=use_backend(device))
 
 
 @pytest.mark.parametrize("make", [hand, blob])
