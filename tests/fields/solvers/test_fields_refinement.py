@@ -160,6 +160,14 @@ def test_a_tolerance_below_rounding_stalls(open_engine):
     assert found.spent.max() < 300
 
 
+def test_a_long_line_is_not_taken_for_stalled():
+    """A refinement that takes the slow part of a residual, and leaves the fast, is followed by another."""
+    system = assemble(Shape.from_mask(np.ones(962)), "voxel")
+    shifts = np.array([1e-6])
+    found = refine(OPEN["host"]([system]), system.mass[:, None] * shifts, shifts, rtol=1e-8, limit=1000)
+    assert found.residual.max() <= 1e-8
+
+
 def test_scales_of_any_size_are_equal():
     """Units of length and strengths of sources far outside of single precision change nothing."""
     mask = np.ones((5, 7))

@@ -13,7 +13,8 @@ from spem.fields.solvers.engine import LANES, Small, SourceEngine
 _MARGIN = 0.3
 # What a refinement leaves of a residual: at least what single precision ends at, at most what is worth one.
 _ROUND = (1e-5, 0.1)
-# A refinement that leaves more of a residual than this has met the rounding of double precision.
+# A refinement that leaves more than this of a residual, in both norms, has met the rounding of double
+# precision. One alone may stay: of long shapes r·z holds the slow part of a residual, r·r the fast.
 _STALLED = 0.5
 
 Counts = NDArray[np.int64]
@@ -81,11 +82,13 @@ def _refine(
     square = engine.load(groups)
     going = square != 0
     residual, spent = np.where(going, np.inf, 0.0), np.zeros(square.shape, np.int64)
+    product = residual
     while going.any():
+        before, last = residual.copy(), product
         product, rest = engine.refine(shifts, going.any(axis=1))
-        before = residual.copy()
         residual[going] = np.sqrt(rest[going] / square[going])
-        going &= (residual > rtol) & (residual <= _STALLED * before) & (spent < limit)
+        better = (residual <= _STALLED * before) | (product <= _STALLED**2 * last)
+        going &= (residual > rtol) & better & (spent < limit)
         if going.any():
             goal = np.ones_like(residual)
             goal[going] = np.clip(_MARGIN * rtol / residual[going], *_ROUND)
