@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from backends import needs_simulator
+from backends import DEVICES, needs_simulator, use_backend
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -107,12 +107,12 @@ def test_codes_are_those_of_the_host(shapes: list[Shape], others: list[Shape], s
     assert np.linalg.norm(host - device, axis=1).max() < 1e-4
 
 
-@needs_simulator
-def test_codes_of_solids_are_those_of_the_host() -> None:
+@pytest.mark.parametrize("name", DEVICES)
+def test_codes_of_solids_are_those_of_the_host(name: str) -> None:
     """Solids are coded alike."""
     solids = [spem.synthetic.ball(1.0, 0.16), spem.synthetic.ball(1.0, 0.19)]
     model = learn([spem.synthetic.box((1.0, 1.5, 2.0), 0.17)], SETTINGS)
-    host, device = (encode_shapes(solids, model, device=each) for each in (Host(), Simulated()))
+    host, device = (encode_shapes(solids, model, device=each) for each in (Host(), use_backend(name)))
     assert np.linalg.norm(host - device, axis=1).max() < 1e-4
 
 
