@@ -188,6 +188,17 @@ def test_a_tolerance_that_single_precision_cannot_hold_is_kept_in_double():
     assert np.abs(field.fields() - Direct().solve(system, rho).values).max() < 3.1e-7
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_sweep_keeps_a_tight_tolerance_below_the_spacing(seed):
+    """What single precision left of the first solves is found, also where no other field is like theirs."""
+    rng = np.random.default_rng(seed)
+    system = assemble(Shape.from_mask(rng.random(1500) < 0.98))
+    rho = np.geomspace(0.1, 50.0, 38)
+    solution = Sweep(rtol=1e-9).solve(system, rho)
+    assert solution.converged
+    assert np.abs(solution.values - Direct().solve(system, rho).values).max() < 1e-9
+
+
 @pytest.mark.parametrize("fraction", [1e-6, 1e-3, 1.0])
 def test_edges_cut_short_cost_no_digits(fraction):
     """A surface a millionth of an edge from the nodes leaves a field that is right to 1e-10."""

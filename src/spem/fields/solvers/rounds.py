@@ -86,33 +86,46 @@ class Rounds:
         self.error, self.iterations = np.zeros(count), np.zeros(count, np.int64)
         # Lowest eigenvalue seen of the preconditioned operator: a cycle finds this part of any error.
         self.found = np.ones(count)
+        # The first block is solved to single precision only: its shifts are measured again in the end.
+        often = rtol < _SINGLE_LIMIT
+        self.unchecked = np.array([often and target.few is None for target in targets])
+        self.checking = np.zeros(count, bool)
 
     def run(self) -> Outcome:
         """Go on until all systems are within the tolerance, or at the limit of blocks."""
-        active = np.array([target.shifts.size > 0 for target in self.targets])
-        for block in range(self.max_blocks + 1):
-            if not active.any():
-                break
+        converged = np.array([target.shifts.size == 0 for target in self.targets])
+        active = ~converged
+        while active.any():
             shifts = self._shifts(active)
             product, peak = self.engine.measure(self.bases.solve(shifts), shifts, active)
             errors = peak / self.found[:, None]
-            self.error[active] = errors.max(axis=1)[active]
-            if block > 0:
-                active = active & (self.error > _ACCEPTED * self.rtol)
-            if block < self.max_blocks and active.any():
-                self._solve(active, product, errors)
-                self.bases.extend(active)
-                for b in np.flatnonzero(active).tolist():
+            worst = errors.max(axis=1)
+            self.error = np.where(active, np.maximum(worst, self.checking * self.error), self.error)
+            blocks = np.array([poles.size // LANES for poles in self.poles])
+            within = active & (blocks > 0) & (worst <= _ACCEPTED * self.rtol)
+            done = within & ~self.unchecked
+            converged |= done
+            self.checking = within & ~done
+            self.unchecked &= ~within
+            unsolved = active & ~within & (blocks < self.max_blocks)
+            active = unsolved | self.checking
+            if unsolved.any():
+                self._solve(unsolved, product, errors)
+                self.bases.extend(unsolved)
+                for b in np.flatnonzero(unsolved).tolist():
                     self.poles[b] = np.append(self.poles[b], shifts[b])
-        return Outcome(self.bases, self.error, self.iterations, ~active)
+        return Outcome(self.bases, self.error, self.iterations, converged)
 
     def _shifts(self, active: Flags) -> Small:
-        """Next eight shifts of each active system; ones for the others."""
+        """Next eight shifts of each active system, or those of its first block; ones for the others."""
         shifts = np.ones((len(self.targets), LANES))
         lowest = self.bases.lowest() if self.bases.source.size else np.zeros(active.size)
         for b in np.flatnonzero(active).tolist():
             target, poles = self.targets[b], self.poles[b]
-            shifts[b] = target.next(poles, lowest[b], self.highest[b]) if poles.size else target.first()
+            if self.checking[b]:
+                shifts[b] = poles[:LANES]
+            else:
+                shifts[b] = target.next(poles, lowest[b], self.highest[b]) if poles.size else target.first()
         return shifts
 
     def _solve(self, active: Flags, product: Small, errors: Small) -> None:
