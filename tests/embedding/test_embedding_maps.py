@@ -142,3 +142,11 @@ def test_a_few_nodes_have_maps(counts):
     fields = np.stack([spem.field(shape, rho, solver=Direct()) for rho in maps.rho], axis=1)
     assert np.allclose(maps.values, fields @ maps.basis, atol=1e-5)
     assert np.isfinite(spem.maps(shape, 3, centred=True).values).all()
+
+
+def test_components_that_are_not_there_are_zero():
+    """On one node all fields are one number each: the first map has it all, the others are zero, not noise."""
+    maps = spem.maps(Shape.from_mask(np.ones((1, 1))), n_maps=4)
+    assert maps.values[0, 0] > 0
+    assert np.array_equal(maps.values[0, 1:], np.zeros(3))
+    assert np.array_equal(maps.variance[1:], np.zeros(3))

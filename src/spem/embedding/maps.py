@@ -178,6 +178,8 @@ def principal_components(
     if centred:
         small[0] = 0.0  # the part along the constant
     left, size, right = np.linalg.svd(small, full_matrices=False)
+    # what rounding leaves of a component that is not there
+    size[size <= max(small.shape) * np.finfo(float).eps * size.max()] = 0.0
     size = np.pad(size, (0, max(0, n_maps - size.size)))
     left, basis = _complete(left, n_maps), _complete(right.T, n_maps)
     sign = _signs(basis, int(np.argmax(rho)))
