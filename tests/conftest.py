@@ -15,6 +15,14 @@ def pytest_configure() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip what needs a CUDA device, with the reason why there is none, before anything is drawn for it."""
+    if item.get_closest_marker("cuda"):
+        from backends import use_backend
+
+        use_backend("cuda")
+
+
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
     """Return the folder of real shapes: SPEM_DATA, or ../shared/data beside the repository."""

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from backends import DEVICES, needs_simulator, use_backend
+from backends import ALL, DEVICES, needs_simulator, use_device
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from simulator import Simulated, SimulatedRuntime
+from simulator.runtime import Order
 
 import spem
 from spem.codes.batch_codes import batch_codes, batch_features
@@ -90,7 +91,7 @@ def test_batches_are_whole_and_no_larger_than_wanted(counts: list[int], most: in
         assert len(places) == 1 or sum(counts[place] + 256 for place in places) <= most
 
 
-@needs_simulator
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize(
     "settings",
     [
@@ -100,20 +101,22 @@ def test_batches_are_whole_and_no_larger_than_wanted(counts: list[int], most: in
     ],
     ids=["default", "paper", "two bands"],
 )
-def test_codes_are_those_of_the_host(shapes: list[Shape], others: list[Shape], settings: Settings) -> None:
+def test_codes_are_those_of_the_host(
+    device: str, shapes: list[Shape], others: list[Shape], settings: Settings
+) -> None:
     """Codes agree to 1e-4: levels, nodes off the boundary, bands."""
     model = learn(others, settings)
-    host, device = (encode_shapes(shapes, model, device=each) for each in (Host(), Simulated()))
-    assert np.linalg.norm(host - device, axis=1).max() < 1e-4
+    host, found = (encode_shapes(shapes, model, device=each) for each in (Host(), use_device(device)))
+    assert np.linalg.norm(host - found, axis=1).max() < 1e-4
 
 
-@pytest.mark.parametrize("name", DEVICES)
-def test_codes_of_solids_are_those_of_the_host(name: str) -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_codes_of_solids_are_those_of_the_host(device: str) -> None:
     """Solids are coded alike."""
     solids = [spem.synthetic.ball(1.0, 0.16), spem.synthetic.ball(1.0, 0.19)]
     model = learn([spem.synthetic.box((1.0, 1.5, 2.0), 0.17)], SETTINGS)
-    host, device = (encode_shapes(solids, model, device=each) for each in (Host(), use_backend(name)))
-    assert np.linalg.norm(host - device, axis=1).max() < 1e-4
+    host, found = (encode_shapes(solids, model, device=each) for each in (Host(), use_device(device)))
+    assert np.linalg.norm(host - found, axis=1).max() < 1e-4
 
 
 def test_host_as_a_device_changes_nothing(shapes: list[Shape]) -> None:
@@ -122,33 +125,41 @@ def test_host_as_a_device_changes_nothing(shapes: list[Shape]) -> None:
         np.testing.assert_array_equal(bands[0], shape_features(shape, SETTINGS)[0])
 
 
-@needs_simulator
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("order", ["backward", "shuffled"])
-def test_neither_batch_nor_order_changes_a_bit(shapes: list[Shape], model: Model, order: str) -> None:
+def test_neither_batch_nor_order_changes_a_bit(
+    device: str, shapes: list[Shape], model: Model, order: Order
+) -> None:
     """A shape has the same features and code alone as in a batch, in any order of blocks and threads."""
-    together = encode_shapes(shapes, model, device=Simulated(order))
-    features = features_of(shapes[::-1], SETTINGS, device=Simulated(order))[::-1]
+    other, first = use_device(device, order), use_device(device)
+    together = encode_shapes(shapes, model, device=other)
+    features = features_of(shapes[::-1], SETTINGS, device=other)[::-1]
     for shape, code, bands in zip(shapes, together, features, strict=True):
-        np.testing.assert_array_equal(encode_shapes([shape], model, device=Simulated())[0], code)
-        np.testing.assert_array_equal(features_of([shape], SETTINGS, device=Simulated())[0][0], bands[0])
+        np.testing.assert_array_equal(encode_shapes([shape], model, device=first)[0], code)
+        np.testing.assert_array_equal(features_of([shape], SETTINGS, device=first)[0][0], bands[0])
 
 
-@needs_simulator
-def test_joined_codes_have_the_other_kinds_of_the_host(shapes: list[Shape], others: list[Shape]) -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_joined_codes_have_the_other_kinds_of_the_host(
+    device: str, shapes: list[Shape], others: list[Shape]
+) -> None:
     """Of several kinds only SPEM maps are made on the device."""
     settings = Settings(features="spem+sources", voxels=None, n_centers=8)
     model = learn(others, settings)
-    features = features_of(shapes, settings, device=Simulated())
+    features = features_of(shapes, settings, device=use_device(device))
     np.testing.assert_array_equal(features[1][1], shape_features(shapes[1], settings)[1])
-    host, device = (encode_shapes(shapes, model, device=each) for each in (Host(), Simulated()))
-    assert np.linalg.norm(host - device, axis=1).max() < 1e-4
+    host, found = (encode_shapes(shapes, model, device=each) for each in (Host(), use_device(device)))
+    assert np.linalg.norm(host - found, axis=1).max() < 1e-4
 
 
-def test_want_of_memory_halves_a_batch(shapes: list[Shape], model: Model) -> None:
+# In the simulator this would take a second; engines halve batches there.
+@pytest.mark.parametrize("name", [ALL[0], ALL[-1]])
+def test_want_of_memory_halves_a_batch(name: str, shapes: list[Shape], model: Model) -> None:
     """A batch that does not fit is halved, down to one shape, and codes stay the same."""
-    device = Small(Host(), 700)
+    inner = Host() if name == "host" else use_device(name)
+    device = Small(inner, 700)
     codes = encode_shapes([*shapes, *shapes], model, device=device)
-    np.testing.assert_array_equal(codes, encode_shapes([*shapes, *shapes], model, device=Host()))
+    np.testing.assert_array_equal(codes, encode_shapes([*shapes, *shapes], model, device=inner))
     assert device.asked[0] == 6
     assert min(device.asked) == 1
 
@@ -255,12 +266,13 @@ def test_shapes_of_several_dimensions_are_refused(shapes: list[Shape]) -> None:
         features_of([shapes[0], spem.synthetic.ball(1.0, 0.3)], SETTINGS, device=Host())
 
 
-@needs_simulator
-def test_maps_of_an_interval() -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_maps_of_an_interval(device: str) -> None:
     """Shapes of one dimension have the maps of the host."""
     shape = spem.synthetic.interval(1.0, 0.01)
-    [[host]], [[device]] = (features_of([shape], SETTINGS, device=each) for each in (Host(), Simulated()))
-    assert np.abs(host - device).max() < 1e-5 * np.abs(host).max()
+    backends = Host(), use_device(device)
+    [[host]], [[found]] = (features_of([shape], SETTINGS, device=each) for each in backends)
+    assert np.abs(host - found).max() < 1e-5 * np.abs(host).max()
 
 
 def test_no_shapes_have_no_codes(model: Model) -> None:

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from backends import needs_simulator
-from simulator import Simulated
+from backends import DEVICES, use_device
 
 import spem
 from spem.codes import device_work, drafts
@@ -66,15 +65,15 @@ def test_collection_with_a_device_is_that_without(folder: Path, whole: Codes, n_
     assert (codes.names, codes.hashes) == (whole.names, whole.hashes)
 
 
-@needs_simulator
-def test_collection_on_the_simulator_has_the_codes_of_the_host(folder: Path) -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_collection_on_a_device_has_the_codes_of_the_host(device: str, folder: Path) -> None:
     """With a given model a device makes the codes of the host to 1e-4."""
     settings = Settings.paper(voxels=None, n_maps=3, n_centers=4)
     files = find_files([folder])
     known = encode_collection(files, settings)
-    codes = spem.encode(files, model=known.model, device=Simulated())
+    codes = spem.encode(files, model=known.model, device=use_device(device))
     assert np.linalg.norm(codes.vectors - known.vectors, axis=1).max() < 1e-4
-    answer = spem.search(codes, files[2], device=Simulated())
+    answer = spem.search(codes, files[2], device=use_device(device))
     assert answer[0].name == "e2"
 
 

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from backends import needs_simulator
+from backends import DEVICES, use_runtime
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simulator import SimulatedRuntime
+from simulator.runtime import ORDERS, Order
 
 from spem.codes.bands import Bands
 from spem.codes.normalise import peak_share
@@ -20,8 +20,6 @@ from spem.codes.word_sums import Rows, WordSums
 from spem.errors import ParameterError
 from spem.fields.solvers.cuda.layout import Layout
 
-pytestmark = needs_simulator
-
 Counts = tuple[tuple[int, int], ...]
 # Red and black nodes: two chunks, a tile of each colour, one node.
 COUNTS: Counts = ((1500, 1200), (100, 90), (1, 0))
@@ -30,8 +28,10 @@ COUNTS: Counts = ((1500, 1200), (100, 90), (1, 0))
 class Tables:
     """Maps of a few shapes in rows as an engine holds them, with rubbish in the rows that are no nodes."""
 
-    def __init__(self, shapes: list[np.ndarray], counts: Counts, order: str = "forward") -> None:
-        self.runtime = SimulatedRuntime(order)
+    def __init__(
+        self, device: str, shapes: list[np.ndarray], counts: Counts, order: Order = "forward"
+    ) -> None:
+        self.runtime = use_runtime(device, order)
         layout = Layout.of(np.array(counts, np.int64), self.runtime)
         starts = zip(np.ravel(counts), layout.first_row.ravel(), strict=True)
         rows = np.concatenate([first + np.arange(count) for count, first in starts])
@@ -73,6 +73,7 @@ def assert_close(found: Residuals, expected: Residuals) -> None:
         assert np.allclose(getattr(found, name), getattr(expected, name), rtol=1e-5, atol=1e-4)
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize(
     "options",
     [
@@ -83,51 +84,54 @@ def assert_close(found: Residuals, expected: Residuals) -> None:
     ids=["default", "whiten", "deviation"],
 )
 @pytest.mark.parametrize("n_maps", [1, 3, 8])
-def test_sums_are_those_of_the_host(n_maps: int, options: dict) -> None:
+def test_sums_are_those_of_the_host(device: str, n_maps: int, options: dict) -> None:
     """Counts, sums and squares of each word and level agree, for all scalings."""
     shapes = make_shapes(COUNTS, n_maps)
     part = fit(shapes, **options)
-    found = Tables(shapes, COUNTS).sums(part)
+    found = Tables(device, shapes, COUNTS).sums(part)
     for residuals, maps in zip(found, shapes, strict=True):
         assert_close(residuals, on_host(part, maps))
 
 
-@given(st.integers(0, 2**31), st.sampled_from(["forward", "backward", "shuffled"]))
+@pytest.mark.parametrize("device", DEVICES)
+@given(st.integers(0, 2**31), st.sampled_from(ORDERS))
 @settings(max_examples=4, deadline=None)
-def test_neither_batch_nor_order_changes_a_bit(seed: int, order: str) -> None:
+def test_neither_batch_nor_order_changes_a_bit(device: str, seed: int, order: Order) -> None:
     """A shape has the same sums alone as in any place of a batch, in any order of blocks and threads."""
     shapes = make_shapes(COUNTS, 4, seed)
     part = fit(shapes, n_centers=6)
     kept = [np.random.default_rng(seed).random(len(maps)) < 0.8 for maps in shapes]
     kept[2][:] = True
-    together = Tables(shapes[::-1], COUNTS[::-1], order).sums(part, kept[::-1])[::-1]
+    together = Tables(device, shapes[::-1], COUNTS[::-1], order).sums(part, kept[::-1])[::-1]
     for maps, count, keep, expected in zip(shapes, COUNTS, kept, together, strict=True):
-        [alone] = Tables([maps], (count,)).sums(part, [keep])
+        [alone] = Tables(device, [maps], (count,)).sums(part, [keep])
         for name in ("counts", "sums", "squares"):
             np.testing.assert_array_equal(getattr(alone, name), getattr(expected, name))
 
 
-def test_nodes_that_are_left_out_count_nowhere() -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_nodes_that_are_left_out_count_nowhere(device: str) -> None:
     """Peaks, root mean squares and sums are those of the nodes that are kept."""
     shapes = make_shapes(COUNTS, 3)
     part = fit(shapes, n_centers=6)
     kept = [np.arange(len(maps)) % 3 == 0 for maps in shapes]
     for maps, keep in zip(shapes, kept, strict=True):
         maps[~keep] *= 50
-    found = Tables(shapes, COUNTS).sums(part, kept)
+    found = Tables(device, shapes, COUNTS).sums(part, kept)
     for residuals, maps, keep in zip(found, shapes, kept, strict=True):
         assert residuals.counts.sum() == keep.sum()
         assert_close(residuals, on_host(part, np.ascontiguousarray(maps[keep])))
 
 
-def test_maps_that_vanish_stay_zero() -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_maps_that_vanish_stay_zero(device: str) -> None:
     """A map that is zero on a shape is a zero feature; of equally near words the first counts."""
     shapes = make_shapes(COUNTS, 3)
     part = fit(shapes, n_centers=4)
     part.centers[0][3] = part.centers[0][1]
     shapes[0][:, 1] = 0
     shapes[1][:] = 0
-    found = Tables(shapes, COUNTS).sums(part)
+    found = Tables(device, shapes, COUNTS).sums(part)
     for residuals, maps in zip(found, shapes, strict=True):
         assert_close(residuals, on_host(part, maps))
         assert not residuals.counts[3::4].any()

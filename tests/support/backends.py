@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 
 import pytest
-from simulator import Simulated
+from simulator import Simulated, SimulatedRuntime
 from simulator.compiler import find_compiler
+from simulator.runtime import Order
 
 from spem.errors import SpemError
 from spem.fields.solvers.cuda.device import Cuda
+from spem.fields.solvers.cuda.runtime import Runtime
 from spem.fields.solvers.engine import Backend
 
 BACKENDS: dict[str, Backend | None] = {"host": None, "simulated": Simulated(), "cuda": Cuda()}
@@ -25,6 +30,37 @@ def use_backend(name: str) -> Backend | None:
     if reason:
         pytest.skip(reason)
     return BACKENDS[name]
+
+
+def use_device(name: str, order: Order = "forward") -> Backend:
+    """Return a backend that runs kernels, in an order of threads where it can be chosen, or skip the test."""
+    use_backend(name)
+    return Simulated(order) if name == "simulated" else Cuda()
+
+
+def use_runtime(name: str, order: Order = "forward") -> Runtime:
+    """Return the runtime of such a backend, or skip the test."""
+    use_backend(name)
+    return SimulatedRuntime(order) if name == "simulated" else Cuda().runtime()
+
+
+@contextmanager
+def with_memory(name: str, n_bytes: int) -> Iterator[Backend]:
+    """Give a backend that has so many bytes left, or skip the test."""
+    use_backend(name)
+    if name == "simulated":
+        yield Simulated(memory=n_bytes)
+        return
+    gc.collect()
+    runtime = Cuda().runtime()
+    runtime.release()
+    pool = runtime.xp.get_default_memory_pool()
+    before = pool.get_limit()
+    pool.set_limit(size=pool.used_bytes() + n_bytes)
+    try:
+        yield Cuda()
+    finally:
+        pool.set_limit(size=before)
 
 
 @cache

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from backends import needs_simulator
+from backends import DEVICES, needs_simulator, use_runtime
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from simulator import SimulatedRuntime
@@ -19,8 +19,6 @@ from spem.fields.solvers.engine import LANES, Small
 from spem.shapes import synthetic
 from spem.shapes.shape import Shape
 
-pytestmark = needs_simulator
-
 DTYPES = [np.float32, np.float64]
 
 
@@ -31,13 +29,18 @@ def porous(*sides: int, spacing: tuple[float, ...] | float = 1.0) -> System:
 
 
 class Bench:
-    """Blocks of a batch over the simulator, filled with random columns, and the same on the host."""
+    """Blocks of a batch on a device, filled with random columns, and the same on the host."""
 
     def __init__(
-        self, *systems: System, dtype: Any = np.float64, n_blocks: int = 0, order: Any = "forward"
+        self,
+        device: str,
+        *systems: System,
+        dtype: Any = np.float64,
+        n_blocks: int = 0,
+        order: Any = "forward",
     ) -> None:
         self.systems, self.rng = systems, np.random.default_rng(0)
-        self.runtime = SimulatedRuntime(order)
+        self.runtime = use_runtime(device, order)
         self.hierarchy = Hierarchy.of(systems, self.runtime)
         self.rows = self.runtime.download(self.hierarchy.rows)
         self.blocks = Blocks(self.hierarchy, dtype, self.runtime)
@@ -82,21 +85,23 @@ def operator(system: System) -> tuple[Any, np.ndarray]:
     return system.matrix() * min(system.shape.spacing) ** 2, system.mass[:, None]
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("n_blocks", [1, 2, 10])
-def test_new_blocks_mix_x_and_the_basis(dtype: Any, n_blocks: int) -> None:
+def test_new_blocks_mix_x_and_the_basis(device: str, dtype: Any, n_blocks: int) -> None:
     """A block is x·mix + B·remove of each system, to the rounding of its precision, and zero in padding."""
-    bench = Bench(porous(12, 13), porous(9, 5), dtype=dtype, n_blocks=n_blocks)
+    bench = Bench(device, porous(12, 13), porous(9, 5), dtype=dtype, n_blocks=n_blocks)
     for found, columns in zip(bench.read(bench.blocks.arrays[-1]), bench.columns, strict=True):
         near = 1e-5 if dtype == np.float32 else 1e-12
         assert found == pytest.approx(columns[:, -LANES:], rel=near, abs=near)
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("n_blocks", [0, 1, 9])
-def test_predictions_are_columns_times_coefficients(dtype: Any, n_blocks: int) -> None:
+def test_predictions_are_columns_times_coefficients(device: str, dtype: Any, n_blocks: int) -> None:
     """B·mix is what dense algebra says, and zero for a basis without columns."""
-    bench = Bench(porous(12, 13), porous(9, 5), dtype=dtype, n_blocks=n_blocks)
+    bench = Bench(device, porous(12, 13), porous(9, 5), dtype=dtype, n_blocks=n_blocks)
     u, mix = bench.runtime.empty(bench.blocks.shape, np.float64), bench.small(n_blocks * LANES, LANES)
     bench.blocks.predict(mix, u)
     for b, found in enumerate(bench.read(u)):
@@ -104,6 +109,7 @@ def test_predictions_are_columns_times_coefficients(dtype: Any, n_blocks: int) -
         assert found == pytest.approx(stored.astype(float) @ mix[b], rel=1e-12, abs=1e-12)
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize(
     "systems",
     [
@@ -114,9 +120,9 @@ def test_predictions_are_columns_times_coefficients(dtype: Any, n_blocks: int) -
     ],
     ids=["1-D", "2-D", "3-D", "4-D"],
 )
-def test_true_residuals_are_those_of_the_sparse_matrix(systems: tuple[System, ...]) -> None:
+def test_true_residuals_are_those_of_the_sparse_matrix(device: str, systems: tuple[System, ...]) -> None:
     """S M (1 − u) − A u and b − (A + s M) v agree with the assembled matrix, r·r too."""
-    bench = Bench(*systems)
+    bench = Bench(device, *systems)
     shifts = np.abs(bench.small(LANES))
     vector, parts = bench.vector(np.float64)
     rhs, right = bench.vector(np.float64)
@@ -134,11 +140,12 @@ def test_true_residuals_are_those_of_the_sparse_matrix(systems: tuple[System, ..
         assert square[b] == pytest.approx(np.sum(left**2, axis=0), rel=1e-13)
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("n_blocks", [1, 3, 6])
-def test_products_are_those_of_dense_algebra(dtype: Any, n_blocks: int) -> None:
+def test_products_are_those_of_dense_algebra(device: str, dtype: Any, n_blocks: int) -> None:
     """BᵀC, BᵀAC, BᵀMC, sums and BᵀX are products in double precision of what is stored."""
-    bench = Bench(porous(30, 50, spacing=(1.0, 0.6)), porous(9, 5), dtype=dtype, n_blocks=n_blocks)
+    bench = Bench(device, porous(30, 50, spacing=(1.0, 0.6)), porous(9, 5), dtype=dtype, n_blocks=n_blocks)
     x, parts = bench.vector()
     overlaps = bench.blocks.overlaps(x)
     for b, system in enumerate(bench.systems):
@@ -154,6 +161,7 @@ def test_products_are_those_of_dense_algebra(dtype: Any, n_blocks: int) -> None:
         assert overlaps[b] == pytest.approx(np.hstack([stored, part]).T @ part, **near)
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @settings(max_examples=4, deadline=None)
 @example(64, np.float32, 1)
 @example(6, np.float32, 2)
@@ -163,9 +171,11 @@ def test_products_are_those_of_dense_algebra(dtype: Any, n_blocks: int) -> None:
     st.sampled_from([np.float32, np.float64]),
     st.integers(0, 2),
 )
-def test_projections_of_any_width_are_constant_plus_columns(width: int, dtype: Any, n_blocks: int) -> None:
+def test_projections_of_any_width_are_constant_plus_columns(
+    device: str, width: int, dtype: Any, n_blocks: int
+) -> None:
     """Tables of fields or maps agree with dense algebra to single precision, for all systems at once."""
-    bench = Bench(porous(12, 13), porous(9, 5), dtype=dtype, n_blocks=n_blocks)
+    bench = Bench(device, porous(12, 13), porous(9, 5), dtype=dtype, n_blocks=n_blocks)
     constant, mix = bench.small(width), bench.small(n_blocks * LANES, width)
     single = bench.read(bench.blocks.project(constant, mix), padding=False)
     columns = bench.split(bench.runtime.download(bench.blocks.columns(mix)))
@@ -179,9 +189,10 @@ def test_projections_of_any_width_are_constant_plus_columns(width: int, dtype: A
         assert columns[b] == pytest.approx(expected, **near)
 
 
-def test_systems_that_are_not_active_are_left_alone() -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_systems_that_are_not_active_are_left_alone(device: str) -> None:
     """Their rows keep what they hold, their new columns and products are zero."""
-    bench = Bench(porous(12, 13), porous(9, 5), n_blocks=1)
+    bench = Bench(device, porous(12, 13), porous(9, 5), n_blocks=1)
     bench.blocks.select(np.array([False, True]))
     u = bench.runtime.upload(np.full(bench.blocks.shape, 7.0))
     bench.blocks.predict(bench.small(LANES, LANES), u)
@@ -195,15 +206,19 @@ def test_systems_that_are_not_active_are_left_alone() -> None:
         assert found[1].any()
 
 
+@needs_simulator
 @pytest.mark.parametrize("order", ["backward", "shuffled"])
 def test_the_order_of_threads_changes_nothing(order: Any) -> None:
     """Kernels have no races: products are the same bit by bit in every order."""
     systems = porous(30, 50), porous(9, 5)
-    first, other = (Bench(*systems, dtype=np.float32, n_blocks=3, order=each) for each in ("forward", order))
+    first, other = (
+        Bench("simulated", *systems, dtype=np.float32, n_blocks=3, order=each) for each in ("forward", order)
+    )
     for one, two in zip(first.products, other.products, strict=True):
         assert np.array_equal(one, two)
 
 
+@needs_simulator
 def test_chunks_of_a_system_do_not_depend_on_its_batch() -> None:
     """Chunks cover the tiles of each system, no more than 1024 and none of fewer than eight but the last."""
     runtime = SimulatedRuntime()

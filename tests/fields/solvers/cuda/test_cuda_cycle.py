@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from backends import needs_simulator
+from backends import DEVICES, needs_simulator, use_runtime
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simulator import SimulatedRuntime
+from simulator.runtime import Order
 
 from spem.fields.operator import assemble
 from spem.fields.solvers.cuda.cycle import TAIL_TILES, Cycle, cycle_bytes
@@ -16,8 +16,6 @@ from spem.fields.solvers.cuda.programs import read_source
 from spem.fields.solvers.engine import LANES
 from spem.fields.solvers.multigrid import COARSEST
 from spem.shapes.shape import Shape
-
-pytestmark = needs_simulator
 
 SHIFTS = np.geomspace(1e-3, 10.0, LANES)
 
@@ -51,10 +49,12 @@ SHAPES = {
 
 
 class Rig:
-    """A cycle over the simulator, on vectors of the host."""
+    """A cycle on a device, on vectors of the host."""
 
-    def __init__(self, *shapes: Shape, order: str = "forward", tail_tiles: int = TAIL_TILES) -> None:
-        self.runtime = SimulatedRuntime(order)
+    def __init__(
+        self, device: str, *shapes: Shape, order: Order = "forward", tail_tiles: int = TAIL_TILES
+    ) -> None:
+        self.runtime = use_runtime(device, order)
         self.hierarchy = Hierarchy.of([assemble(shape) for shape in shapes], self.runtime)
         self.cycle = Cycle(self.hierarchy, self.runtime, tail_tiles)
         self.n_rows = self.hierarchy.levels[0].layout.n_rows
@@ -116,11 +116,12 @@ def dense_cycle(matrices, maps, reds, r: np.ndarray) -> np.ndarray:
     return relax(relax(z, ~red), red)
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("tail_tiles", [0, 2, TAIL_TILES])
 @pytest.mark.parametrize("name", SHAPES)
-def test_is_the_symmetric_cycle_of_dense_algebra(name, tail_tiles):
+def test_is_the_symmetric_cycle_of_dense_algebra(device, name, tail_tiles):
     """One application equals red-black Gauss-Seidel, a coarse solve, and back, in dense double precision."""
-    rig = Rig(SHAPES[name], tail_tiles=tail_tiles)
+    rig = Rig(device, SHAPES[name], tail_tiles=tail_tiles)
     rig.prepare()
     rhs = np.random.default_rng(0).standard_normal((rig.rows.size, LANES)).astype(np.float32)
     found, partial = rig.apply(rhs)
@@ -132,10 +133,11 @@ def test_is_the_symmetric_cycle_of_dense_algebra(name, tail_tiles):
     assert np.allclose(partial.sum(axis=0), np.sum(rhs.astype(float) * found, axis=0), rtol=1e-12)
 
 
-def test_is_symmetric_and_positive():
+@pytest.mark.parametrize("device", DEVICES)
+def test_is_symmetric_and_positive(device):
     """As a matrix the cycle is symmetric, and with A + s M it has eigenvalues in (0, 2)."""
     shape = porous(6, 5, 7)
-    rig, n = Rig(shape, tail_tiles=0), shape.n_nodes
+    rig, n = Rig(device, shape, tail_tiles=0), shape.n_nodes
     rig.prepare(np.full(LANES, 0.01))
     columns = np.zeros((n, n + LANES))
     for k in range(0, n, LANES):
@@ -148,9 +150,10 @@ def test_is_symmetric_and_positive():
     assert eigenvalues[-1] < 1.5
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @settings(max_examples=6, deadline=None, derandomize=True)
 @given(sides=st.lists(st.tuples(*[st.integers(1, 12)] * 3), min_size=2, max_size=4), seed=st.integers(0, 99))
-def test_answers_do_not_depend_on_the_batch_or_on_the_order_of_threads(sides, seed):
+def test_answers_do_not_depend_on_the_batch_or_on_the_order_of_threads(device, sides, seed):
     """Each system of a batch gets the bits that it gets alone, in whatever order threads and blocks run."""
     rng = np.random.default_rng(seed)
     shapes = []
@@ -158,23 +161,24 @@ def test_answers_do_not_depend_on_the_batch_or_on_the_order_of_threads(sides, se
         mask = rng.random(each) < 0.8
         mask.flat[0] = True
         shapes.append(Shape.from_mask(mask))
-    batch = Rig(*shapes, tail_tiles=2, order="shuffled")
+    batch = Rig(device, *shapes, tail_tiles=2, order="shuffled")
     batch.prepare()
     rhs = rng.standard_normal((batch.rows.size, LANES))
     found, partial = batch.apply(rhs)
     first_tile = batch.hierarchy.levels[0].layout.first_tile
     for b, shape in enumerate(shapes):
-        alone = Rig(shape, tail_tiles=2, order=("forward", "backward")[b % 2])
+        alone = Rig(device, shape, tail_tiles=2, order=("forward", "backward")[b % 2])
         alone.prepare()
         answer, sums = alone.apply(rhs[batch.nodes(b)])
         assert np.array_equal(found[batch.nodes(b)], answer)
         assert np.array_equal(partial[first_tile[b] : first_tile[b + 1]], sums)
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("tail_tiles", [0, TAIL_TILES])
-def test_systems_that_are_not_active_keep_their_vectors(tail_tiles):
+def test_systems_that_are_not_active_keep_their_vectors(device, tail_tiles):
     """Only the rows and tiles of active systems are written, and they get what all active would give them."""
-    rig = Rig(porous(9, 9, 9), porous(8, 9, 10), box(3, 3, 3), tail_tiles=tail_tiles)
+    rig = Rig(device, porous(9, 9, 9), porous(8, 9, 10), box(3, 3, 3), tail_tiles=tail_tiles)
     rig.prepare()
     rhs = np.random.default_rng(5).standard_normal((rig.rows.size, LANES))
     whole, _ = rig.apply(rhs)
@@ -188,9 +192,10 @@ def test_systems_that_are_not_active_keep_their_vectors(tail_tiles):
     assert not rig.apply(rhs)[0].any()
 
 
-def test_lanes_with_nothing_to_solve_stay_zero():
+@pytest.mark.parametrize("device", DEVICES)
+def test_lanes_with_nothing_to_solve_stay_zero(device):
     """A residual of zeros has an answer of zeros, whatever other lanes and the call before had."""
-    rig = Rig(porous(9, 9, 9), tail_tiles=2)
+    rig = Rig(device, porous(9, 9, 9), tail_tiles=2)
     rig.prepare()
     rhs = np.ones((rig.rows.size, LANES))
     rig.apply(rhs)
@@ -201,10 +206,11 @@ def test_lanes_with_nothing_to_solve_stay_zero():
     assert found[:, [0, 1, 5, 6, 7]].all()
 
 
-def test_coarsest_systems_are_solved_exactly():
+@pytest.mark.parametrize("device", DEVICES)
+def test_coarsest_systems_are_solved_exactly(device):
     """A system of few nodes is inverted: the answer is its solution, for shifts of any size."""
     shape = porous(5, 4, 3)
-    rig = Rig(shape, box(1, 1, 1))
+    rig = Rig(device, shape, box(1, 1, 1))
     shifts = np.geomspace(1e-12, 1e12, LANES)
     rig.prepare(shifts)
     found, _ = rig.apply(np.ones((rig.rows.size, LANES)))
@@ -213,12 +219,13 @@ def test_coarsest_systems_are_solved_exactly():
         assert np.allclose(found[rig.nodes(0), lane], exact, rtol=1e-5)
 
 
+@needs_simulator
 def test_bytes_of_a_cycle():
     """They add up over systems; a system that is inverted reads its inverse and r, and writes z."""
     small, large = box(2, 2, 2), porous(9, 9, 9)
-    assert cycle_bytes(Rig(small).hierarchy) == 32 * (8 * 8 + 8 + 8)
-    parts = [cycle_bytes(Rig(shape).hierarchy) for shape in (small, large)]
-    assert cycle_bytes(Rig(small, large).hierarchy) == sum(parts)
+    assert cycle_bytes(Rig("simulated", small).hierarchy) == 32 * (8 * 8 + 8 + 8)
+    parts = [cycle_bytes(Rig("simulated", shape).hierarchy) for shape in (small, large)]
+    assert cycle_bytes(Rig("simulated", small, large).hierarchy) == sum(parts)
     assert 200 < parts[1] / large.n_nodes < 400
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from backends import needs_simulator
-from simulator import Simulated, SimulatedRuntime
+from backends import DEVICES, needs_simulator, use_device, use_runtime, with_memory
+from simulator import SimulatedRuntime
 from simulator.runtime import DeviceMemoryError
 
 from spem.errors import ParameterError, SizeError
@@ -21,8 +21,6 @@ from spem.fields.solvers.host import HostEngine
 from spem.fields.solvers.sweep import Sweep
 from spem.shapes import synthetic
 from spem.shapes.shape import Shape
-
-pytestmark = needs_simulator
 
 RHO = np.geomspace(0.5, 20.0, 16)
 SHIFTS = np.geomspace(1e-2, 4.0, LANES)
@@ -84,13 +82,14 @@ def two_blocks(engine: SourceEngine) -> list[Any]:
     return [*answers, *engine.columns(turn)]
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize(
     ("name", "dtype"), [("1-D", np.float64), ("2-D", np.float32), ("3-D", np.float64), ("4-D", np.float32)]
 )
-def test_answers_are_those_of_the_host(name: str, dtype: Any) -> None:
+def test_answers_are_those_of_the_host(device: str, name: str, dtype: Any) -> None:
     """Solutions, products and columns agree with the host's to the accuracy of the solves."""
     systems = BATCHES[name]
-    engine = CudaEngine(systems, dtype, SimulatedRuntime())
+    engine = CudaEngine(systems, dtype, use_runtime(device))
     host = HostEngine(systems, dtype)
     assert engine.counts.tolist() == host.counts.tolist()
     assert engine.units.tolist() == host.units.tolist()
@@ -99,9 +98,10 @@ def test_answers_are_those_of_the_host(name: str, dtype: Any) -> None:
         assert found == pytest.approx(expected, rel=1e-4, abs=3e-6 * float(np.abs(expected).max()))
 
 
-def test_solutions_solve_the_systems(systems: tuple[System, ...]) -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_solutions_solve_the_systems(device: str, systems: tuple[System, ...]) -> None:
     """Columns of a first block are the deficits u, (A + s M) u = s M·1, and z has the size of the error."""
-    engine = CudaEngine(systems, np.float64, SimulatedRuntime())
+    engine = CudaEngine(systems, np.float64, use_runtime(device))
     active, count = np.ones(len(systems), bool), len(systems)
     product, peak = engine.measure(np.zeros((count, 0, LANES)), np.tile(SHIFTS, (count, 1)), active)
     solve(engine, product, active)
@@ -115,9 +115,10 @@ def test_solutions_solve_the_systems(systems: tuple[System, ...]) -> None:
             assert 0.3 < peak[b, lane] / deficit.max() < 3
 
 
-def test_right_hand_sides_are_refined_to_double_precision(systems: tuple[System, ...]) -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_right_hand_sides_are_refined_to_double_precision(device: str, systems: tuple[System, ...]) -> None:
     """Rounds of refinement solve (A + s M) v = b to 1e-12, with the residuals that they tell of."""
-    engine = CudaEngine(systems, np.float32, SimulatedRuntime())
+    engine = CudaEngine(systems, np.float32, use_runtime(device))
     rng, active = np.random.default_rng(0), np.ones(len(systems), bool)
     rhs = [rng.normal(size=(system.n_nodes, LANES)) for system in systems]
     shifts = np.tile(SHIFTS, (len(systems), 1))
@@ -136,26 +137,28 @@ def test_right_hand_sides_are_refined_to_double_precision(systems: tuple[System,
             assert np.linalg.norm(left) <= 2e-12 * np.linalg.norm(b[:, lane])
 
 
-def test_a_batch_gives_what_its_systems_give_alone() -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_a_batch_gives_what_its_systems_give_alone(device: str) -> None:
     """Sweeps of several systems and of each alone are the same, bit by bit, in any order of threads."""
     systems = *BATCHES["3-D"], assemble(synthetic.box((3.0, 9.0, 5.0), 1.0))
-    together = Sweep(device=Simulated()).hyperfields(systems, [RHO] * 3)
+    together = Sweep(device=use_device(device)).hyperfields(systems, [RHO] * 3)
     for order in ("backward", "shuffled"):
-        alone = [Sweep(device=Simulated(order)).hyperfield(system, RHO) for system in systems]
+        alone = [Sweep(device=use_device(device, order)).hyperfield(system, RHO) for system in systems]
         for one, other in zip(together, alone, strict=True):
             assert one.error == other.error
             for name in ("basis", "gram", "mass", "stiffness", "source"):
                 assert np.array_equal(getattr(one, name), getattr(other, name))
 
 
-def test_inactive_systems_answer_zero_and_keep_their_vectors() -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_inactive_systems_answer_zero_and_keep_their_vectors(device: str) -> None:
     """Systems that are left out of a search answer zero, and go on later from where they were."""
     systems = BATCHES["2-D"]
     shifts, everyone = np.tile(SHIFTS, (3, 1)), np.ones(3, bool)
     some = np.array([True, False, True])
     answers = []
     for narrow in (False, True):
-        engine = CudaEngine(systems, np.float64, SimulatedRuntime())
+        engine = CudaEngine(systems, np.float64, use_runtime(device))
         product, _ = engine.measure(np.zeros((3, 0, LANES)), shifts, everyone)
         alpha = ratio(product, engine.search(None))
         engine.improve(alpha)
@@ -172,10 +175,11 @@ def test_inactive_systems_answer_zero_and_keep_their_vectors() -> None:
     assert not peak[1].any()
 
 
-def test_projections_are_fields_in_node_order() -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_projections_are_fields_in_node_order(device: str) -> None:
     """Constant + B·mix on the device agrees with columns on the host."""
     systems = BATCHES["3-D"]
-    engine = CudaEngine(systems, np.float32, SimulatedRuntime())
+    engine = CudaEngine(systems, np.float32, use_runtime(device))
     two_blocks(engine)
     rng = np.random.default_rng(0)
     constant, mix = rng.normal(size=(2, 11)), rng.normal(size=(2, 2 * LANES, 11))
@@ -187,11 +191,12 @@ def test_projections_are_fields_in_node_order() -> None:
         assert values == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
 
 
-def test_stages_are_timed_and_counted_apart() -> None:
+@pytest.mark.parametrize("device", DEVICES)
+def test_stages_are_timed_and_counted_apart(device: str) -> None:
     """A profile tells seconds and bytes of each stage; without one there are no seconds."""
     systems = BATCHES["2-D"]
     for profile in (False, True):
-        engine = CudaEngine(systems, np.float32, SimulatedRuntime(), profile=profile)
+        engine = CudaEngine(systems, np.float32, use_runtime(device), profile=profile)
         product, _ = engine.measure(np.zeros((3, 0, LANES)), np.ones((3, LANES)), np.ones(3, bool))
         engine.search(None)
         engine.improve(product)
@@ -231,6 +236,7 @@ class Lent:
         return CudaEngine(systems, dtype, self.runtime)
 
 
+@needs_simulator
 def test_memory_that_ends_leaves_nothing_behind() -> None:
     """Wherever a device fails to give memory, the error tells the sizes and all memory is given back."""
     systems = BATCHES["2-D"][:1]
@@ -246,22 +252,29 @@ def test_memory_that_ends_leaves_nothing_behind() -> None:
         assert runtime.free_bytes() == runtime.whole, failing
 
 
-def test_too_large_a_batch_is_refused_before_anything_is_allocated() -> None:
-    """A batch over the free memory, or over 32-bit numbers, is refused with its sizes; halves may do."""
+@pytest.mark.parametrize("device", DEVICES)
+def test_too_large_a_batch_is_refused_before_anything_is_allocated(device: str) -> None:
+    """A batch over the free memory is refused with its sizes; halves may do."""
     systems = BATCHES["2-D"]
-    small = Simulated(memory=engine_bytes(systems, np.float32, 3) - 1)
-    message = r"3 shapes of 349 nodes with 24 columns would take .* MiB on the simulator, which has .* free"
-    with pytest.raises(SizeError, match=message):
-        small.open(systems, np.float32)
-    fields = Sweep(device=small).hyperfields(systems, [RHO] * 3)
-    expected = Sweep(device=Simulated()).hyperfields(systems, [RHO] * 3)
+    message = r"3 shapes of 349 nodes with 24 columns would take .* MiB on .*, which has .* free"
+    with with_memory(device, engine_bytes(systems, np.float32, 3) - 1) as small:
+        with pytest.raises(SizeError, match=message):
+            small.open(systems, np.float32)
+        fields = Sweep(device=small).hyperfields(systems, [RHO] * 3)
+    expected = Sweep(device=use_device(device)).hyperfields(systems, [RHO] * 3)
     for one, other in zip(fields, expected, strict=True):
         assert np.array_equal(one.basis, other.basis)
+
+
+def test_more_rows_than_can_be_numbered_are_refused() -> None:
+    """A batch over 32-bit numbers is refused, whatever the memory."""
+    systems = BATCHES["2-D"]
     assert require_batch([systems[0]] * 1000) is None
     with pytest.raises(SizeError, match=r"1200000 shapes of 320,400,000 nodes: .* at most 536,870,912 "):
         require_batch([systems[0]] * 1_200_000)
 
 
+@needs_simulator
 def test_the_estimate_of_memory_is_close() -> None:
     """A sweep holds no more than was estimated for its blocks, and most of that."""
     system = assemble(synthetic.ball(11.0, 1.0))
@@ -274,6 +287,7 @@ def test_the_estimate_of_memory_is_close() -> None:
     assert runtime.most <= 1.3 * estimate
 
 
+@needs_simulator
 def test_a_closed_engine_says_so() -> None:
     """Whatever is asked of a closed engine, or of one without right-hand sides, is refused in one line."""
     engine = CudaEngine(BATCHES["2-D"], np.float32, SimulatedRuntime())
@@ -286,6 +300,7 @@ def test_a_closed_engine_says_so() -> None:
             ask()
 
 
+@needs_simulator
 def test_batches_of_several_dimensions_are_refused() -> None:
     """Systems of different dimensions do not go together, and none is no batch."""
     for systems in ((), (BATCHES["1-D"][0], BATCHES["2-D"][0])):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from backends import needs_simulator
-from simulator import SimulatedRuntime
+from backends import DEVICES, needs_simulator, use_runtime
+from simulator.runtime import Order
 
 from spem.fields.operator import assemble
 from spem.fields.solvers.cuda import krylov
@@ -15,8 +15,6 @@ from spem.fields.solvers.cuda.levels import Hierarchy
 from spem.fields.solvers.engine import LANES
 from spem.fields.solvers.host import HostEngine
 from spem.shapes.shape import Shape
-
-pytestmark = needs_simulator
 
 SHIFTS = np.geomspace(1e-3, 10.0, LANES)
 
@@ -48,11 +46,13 @@ def ratio(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
 
 
 class Solver:
-    """Conjugate gradients over the simulator, on vectors of the host."""
+    """Conjugate gradients on a device, on vectors of the host."""
 
-    def __init__(self, *shapes: Shape, order: str = "forward", tail_tiles: int = TAIL_TILES) -> None:
+    def __init__(
+        self, device: str, *shapes: Shape, order: Order = "forward", tail_tiles: int = TAIL_TILES
+    ) -> None:
         self.systems = [assemble(shape) for shape in shapes]
-        self.runtime = runtime = SimulatedRuntime(order)
+        self.runtime = runtime = use_runtime(device, order)
         self.hierarchy = Hierarchy.of(self.systems, runtime)
         self.rows = runtime.download(self.hierarchy.rows)
         shape = self.hierarchy.levels[0].layout.n_rows + 1, LANES
@@ -93,9 +93,10 @@ def iterate(engine, rz: np.ndarray, tolerance: float = 1e-6, limit: int = 100) -
     return count
 
 
-def test_solves_the_equations():
+@pytest.mark.parametrize("device", DEVICES)
+def test_solves_the_equations(device):
     """The solutions of a batch satisfy their linear systems, computed independently in dense algebra."""
-    solver = Solver(porous(9, 10, 11), porous(4, 4, 4), porous(1, 1, 60))
+    solver = Solver(device, porous(9, 10, 11), porous(4, 4, 4), porous(1, 1, 60))
     rhs = np.random.default_rng(1).standard_normal((solver.rows.size, LANES))
     iterate(solver.krylov, solver.start(rhs))
     solver.krylov.finish()
@@ -114,11 +115,12 @@ SHAPES = {
 }
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("name", SHAPES)
-def test_converges_about_as_fast_as_on_the_host(name):
+def test_converges_about_as_fast_as_on_the_host(device, name):
     """Iterations are at most 1.3 times those with the host's cycle, or one more where these are few."""
     shape, shifts = SHAPES[name], np.geomspace(1e-4, 10.0, LANES)
-    solver = Solver(shape)
+    solver = Solver(device, shape)
     system = solver.systems[0]
     engine = HostEngine([system], np.float32, 1)
     rz, _ = engine.measure(np.zeros((1, 0, LANES)), shifts[None], np.ones(1, bool))
@@ -127,10 +129,11 @@ def test_converges_about_as_fast_as_on_the_host(name):
     assert found <= max(1.3 * wanted, wanted + 1)
 
 
-def test_products_and_peaks_are_those_of_the_vectors(monkeypatch):
+@pytest.mark.parametrize("device", DEVICES)
+def test_products_and_peaks_are_those_of_the_vectors(device, monkeypatch):
     """r·z, p·q, q and the largest |z| are right, however many runs of tiles they are added up in."""
     monkeypatch.setattr(krylov, "_RUN_TILES", 2)
-    solver = Solver(porous(10, 11, 12), porous(3, 3, 3))
+    solver = Solver(device, porous(10, 11, 12), porous(3, 3, 3))
     rhs = np.random.default_rng(2).standard_normal((solver.rows.size, LANES)).astype(np.float32)
     rz, (x, _, z, p, q) = solver.start(rhs), solver.vectors
     peak, pq = solver.krylov.peak(), solver.krylov.search(None)
@@ -148,25 +151,27 @@ def test_products_and_peaks_are_those_of_the_vectors(monkeypatch):
             assert np.allclose(product[own, lane], exact, atol=1e-6 * np.abs(exact).max())
 
 
-def test_iterations_do_not_depend_on_the_batch_or_on_the_order_of_threads():
+@pytest.mark.parametrize("device", DEVICES)
+def test_iterations_do_not_depend_on_the_batch_or_on_the_order_of_threads(device):
     """Each system of a batch gets the bits that it gets alone, in whatever order threads and blocks run."""
     shapes = porous(9, 8, 11), porous(2, 4, 3), porous(7, 7, 7)
-    batch = Solver(*shapes, order="shuffled", tail_tiles=2)
+    batch = Solver(device, *shapes, order="shuffled", tail_tiles=2)
     rhs = np.random.default_rng(4).standard_normal((batch.rows.size, LANES))
     iterate(batch.krylov, batch.start(rhs), 0.0, 4)
     batch.krylov.finish()
     found, first = batch.read(batch.vectors.x), batch.hierarchy.first_node
     for b, (shape, order) in enumerate(zip(shapes, ("forward", "backward", "shuffled"), strict=True)):
-        alone, own = Solver(shape, order=order, tail_tiles=2), slice(first[b], first[b + 1])
+        alone, own = Solver(device, shape, order=order, tail_tiles=2), slice(first[b], first[b + 1])
         iterate(alone.krylov, alone.start(rhs[own]), 0.0, 4)
         alone.krylov.finish()
         assert np.array_equal(found[own], alone.read(alone.vectors.x))
 
 
-def test_selecting_takes_the_last_step_and_leaves_others_alone():
+@pytest.mark.parametrize("device", DEVICES)
+def test_selecting_takes_the_last_step_and_leaves_others_alone(device):
     """A system that is left out keeps its last x; one that goes on gets the bits it would have got."""
     shapes = porous(6, 7, 8), porous(7, 7, 7)
-    solver, other = Solver(*shapes), Solver(*shapes)
+    solver, other = Solver(device, *shapes), Solver(device, *shapes)
     rhs = np.random.default_rng(6).standard_normal((solver.rows.size, LANES))
     cut = solver.hierarchy.first_node[1]
     rz = solver.start(rhs)
@@ -188,10 +193,11 @@ def test_selecting_takes_the_last_step_and_leaves_others_alone():
     assert not solver.krylov.search(None).any()
 
 
-def test_selecting_the_same_systems_moves_nothing(monkeypatch):
+@pytest.mark.parametrize("device", DEVICES)
+def test_selecting_the_same_systems_moves_nothing(device, monkeypatch):
     """What is selected already is not uploaded again, and other shifts for it still count."""
     rhs = np.random.default_rng(1).standard_normal((ball(3).n_nodes, LANES))
-    solver = Solver(ball(3))
+    solver = Solver(device, ball(3))
     first = solver.start(rhs)
     uploads = []
     with monkeypatch.context() as patch:
@@ -199,12 +205,13 @@ def test_selecting_the_same_systems_moves_nothing(monkeypatch):
         solver.krylov.select(solver.active.copy())
     assert uploads == []
     assert np.array_equal(solver.krylov.precondition(), first)
-    assert np.array_equal(solver.start(rhs, 2 * SHIFTS), Solver(ball(3)).start(rhs, 2 * SHIFTS))
+    assert np.array_equal(solver.start(rhs, 2 * SHIFTS), Solver(device, ball(3)).start(rhs, 2 * SHIFTS))
 
 
-def test_lanes_with_nothing_to_solve_stay_zero():
+@pytest.mark.parametrize("device", DEVICES)
+def test_lanes_with_nothing_to_solve_stay_zero(device):
     """Lanes with r = 0 have x = 0 after any number of iterations, and no product is wrong for them."""
-    solver = Solver(porous(7, 7, 7))
+    solver = Solver(device, porous(7, 7, 7))
     rhs = np.ones((solver.rows.size, LANES))
     rhs[:, ::3] = 0
     iterate(solver.krylov, solver.start(rhs))
@@ -214,9 +221,10 @@ def test_lanes_with_nothing_to_solve_stay_zero():
     assert found[:, 1].all()
 
 
+@needs_simulator
 def test_bytes_of_an_iteration():
     """They add up over systems, and are a few hundred a node."""
     shapes = porous(9, 9, 9), porous(20, 3, 5)
-    parts = [bytes_per_iteration(Solver(shape).hierarchy) for shape in shapes]
-    assert bytes_per_iteration(Solver(*shapes).hierarchy) == sum(parts)
+    parts = [bytes_per_iteration(Solver("simulated", shape).hierarchy) for shape in shapes]
+    assert bytes_per_iteration(Solver("simulated", *shapes).hierarchy) == sum(parts)
     assert 500 < parts[0] / shapes[0].n_nodes < 900
