@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from spem.fields.rho import DEFAULT_COUNT, Scheme, check_rho, sample_rho
 from spem.fields.solvers.engine import Backend
 from spem.fields.solvers.protocol import Solver, require_solver
 from spem.fields.solvers.sweep import Sweep
+from spem.fields.solvers.team import usable_threads
 from spem.shapes.shape import Shape
 
 # A few fields asked for by name are worth more digits than a sweep that feeds maps.
@@ -166,7 +168,8 @@ def sweep_many(
         msg = f"shapes={shapes!r}: expected a list of shapes; use spem.sweep for one"
         raise ParameterError(msg)
     shapes, given = list(shapes), None if rho is None else check_rho(rho)
-    systems = [assemble(shape, boundary) for shape in shapes]
+    with ThreadPoolExecutor(usable_threads()) as pool:
+        systems = list(pool.map(lambda shape: assemble(shape, boundary), shapes))
     solver, found = Sweep(rtol=rtol, device=device), dict[int, Hyperfield]()
     for ndim in sorted({shape.ndim for shape in shapes}):
         rows = [row for row, shape in enumerate(shapes) if shape.ndim == ndim]

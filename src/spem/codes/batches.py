@@ -23,6 +23,7 @@ from spem.fields.solvers.batch import Batch
 from spem.fields.solvers.cuda.device import Cuda
 from spem.fields.solvers.engine import Backend, require_backend
 from spem.fields.solvers.sweep import Sweep
+from spem.fields.solvers.team import usable_threads
 from spem.shapes.shape import Shape
 
 # The kind of features that is made on a device.
@@ -246,15 +247,16 @@ def _swept(
         raise ParameterError(msg)
     plan = batches([shape.n_nodes for shape in shapes], max_nodes)
 
-    def prepare(places: range) -> list[_Ready | SpemError]:
-        return [_attempt(lambda shape: _ready(shape, settings), shapes[place]) for place in places]
+    def prepare(shape: Shape) -> _Ready | SpemError:
+        return _attempt(lambda each: _ready(each, settings), shape)
 
     # The next batch is discretised while this one is on the device.
-    with ThreadPoolExecutor(1) as pool:
-        ahead = [pool.submit(prepare, places) for places in plan[:1]]
+    with ThreadPoolExecutor(usable_threads()) as pool:
+        ahead = [pool.map(prepare, shapes[places.start : places.stop]) for places in plan[:1]]
         for number in range(len(plan)):
-            given = ahead.pop().result()
-            ahead = [pool.submit(prepare, places) for places in plan[number + 1 : number + 2]]
+            given = list(ahead.pop())
+            following = plan[number + 1 : number + 2]
+            ahead = [pool.map(prepare, shapes[places.start : places.stop]) for places in following]
             made = iter(_together([each for each in given if isinstance(each, _Ready)], sweep, make))
             yield from (next(made) if isinstance(each, _Ready) else each for each in given)
 

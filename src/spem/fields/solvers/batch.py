@@ -94,8 +94,8 @@ class Batch:
 
     def _failure(self, index: int) -> ConvergenceError:
         """Say what was missed; the error carries the best iterate."""
-        [columns] = self.engine.columns([r.turn for r in self.reduced])[index : index + 1]
-        field = self._hyperfield(index, columns)
+        turns = [each.turn if b == index else each.turn[:, :0] for b, each in enumerate(self.reduced)]
+        field = self._hyperfield(index, self.engine.columns(turns)[index])
         best = Solution(
             field.at(self.rho[index][:1]),
             self.outcome.error[index : index + 1],
