@@ -145,7 +145,7 @@ def test_a_few_nodes_have_maps(counts):
 
 
 def test_components_that_are_not_there_are_zero():
-    """On one node all fields are one number each: the first map has it all, the others are zero, not noise."""
+    """On one node every field is one number: the first map has it all, the others are zero, not noise."""
     maps = spem.maps(Shape.from_mask(np.ones((1, 1))), n_maps=4)
     assert maps.values[0, 0] > 0
     assert np.array_equal(maps.values[0, 1:], np.zeros(3))
