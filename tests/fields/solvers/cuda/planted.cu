@@ -24,6 +24,14 @@ extern "C" __global__ void reverse(int* out, int barrier) {
     out[threadIdx.x] = held[THREADS - 1 - threadIdx.x];
 }
 
+extern "C" __global__ void halve(float* v) { v[threadIdx.x] *= 0.5f; }
+
+// Halves behind a barrier, where threads are fibers.
+extern "C" __global__ void halve_later(float* v) {
+    __syncthreads();
+    v[threadIdx.x] *= 0.5f;
+}
+
 extern "C" __global__ void last_block(int* out) { *out = blockIdx.x; }
 
 extern "C" __global__ void stale_shared(float* out) {

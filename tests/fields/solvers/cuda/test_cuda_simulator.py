@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import re
 from pathlib import Path
 
@@ -92,6 +93,16 @@ def test_blocks_run_in_the_order_too() -> None:
     last = {order: int(launch("last_block", 7, np.zeros(1, np.int32), order=order)[0]) for order in ORDERS}
     assert last["forward"] == 6
     assert last["backward"] == 0
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="denormals are flushed on x86-64 alone")
+@pytest.mark.parametrize("kernel", ["halve", "halve_later"])
+def test_denormals_are_flushed(kernel: str) -> None:
+    """As in kernels that CuPy compiles, numbers below the least normal one are zero; NumPy's are not."""
+    least = np.finfo(np.float32).tiny
+    values = np.resize([4 * least, least], THREADS).astype(np.float32)
+    assert np.array_equal(launch(kernel, 1, values)[:2], [2 * least, 0])
+    assert least / 2 > 0
 
 
 def test_shared_memory_is_poisoned_before_each_block() -> None:
