@@ -8,7 +8,6 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from spem.errors import ConvergenceError
 from spem.fields.hyperfield import Hyperfield
 from spem.fields.operator import System
 from spem.fields.solvers.engine import SourceEngine
@@ -64,8 +63,18 @@ class Batch:
 
     def require(self, index: int) -> None:
         """Raise `ConvergenceError` if the sweep of a system missed its tolerance."""
-        if not self.outcome.converged[index]:
-            raise self._failure(index)
+        if self.outcome.converged[index]:
+            return
+        turns = [each.turn if b == index else each.turn[:, :0] for b, each in enumerate(self.reduced)]
+        field = self._hyperfield(index, self.engine.columns(turns)[index])
+        best = Solution(
+            field.at(self.rho[index][:1]),
+            self.outcome.error[index : index + 1],
+            False,
+            int(self.outcome.iterations[index]),
+            self.advice,
+        )
+        best.checked(self.systems[index].shape.name)
 
     def hyperfields(self) -> list[Hyperfield]:
         """Return the hyperfields, whether they converged or not, in one transfer."""
@@ -91,20 +100,3 @@ class Batch:
             system.boundary,
             float(self.outcome.error[index]) + rounding,
         )
-
-    def _failure(self, index: int) -> ConvergenceError:
-        """Say what was missed; the error carries the best iterate."""
-        turns = [each.turn if b == index else each.turn[:, :0] for b, each in enumerate(self.reduced)]
-        field = self._hyperfield(index, self.engine.columns(turns)[index])
-        best = Solution(
-            field.at(self.rho[index][:1]),
-            self.outcome.error[index : index + 1],
-            False,
-            int(self.outcome.iterations[index]),
-            self.advice,
-        )
-        try:
-            best.checked(self.systems[index].shape.name)
-        except ConvergenceError as error:
-            return error
-        raise AssertionError

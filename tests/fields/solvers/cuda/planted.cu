@@ -9,6 +9,19 @@ extern "C" __global__ void reduce_tiles(double* out, const float* rows) {
     }
 }
 
+// Sum of one number of each thread of the block, returned by thread 0; all threads call it.
+__device__ inline double block_sum(double value) {
+    __shared__ double scratch[THREADS / 32];
+    for (int step = 16; step > 0; step /= 2) value += __shfl_xor_sync(0xffffffffu, value, step);
+    if (threadIdx.x % 32 == 0) scratch[threadIdx.x / 32] = value;
+    __syncthreads();
+    double result = 0;
+    if (threadIdx.x == 0)
+        for (int i = 0; i < THREADS / 32; i++) result += scratch[i];
+    __syncthreads();
+    return result;
+}
+
 extern "C" __global__ void sum_block(double* out) {
     const double sum = block_sum(threadIdx.x);
     if (threadIdx.x == 0) out[blockIdx.x] = sum;

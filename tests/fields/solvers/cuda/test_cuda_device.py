@@ -11,7 +11,7 @@ import pytest
 
 import spem
 from spem.errors import MissingExtraError, ParameterError
-from spem.fields.solvers.cuda.cupy_runtime import require_compiler, require_device
+from spem.fields.solvers.cuda.cupy_runtime import require_compiler, require_driver
 from spem.fields.solvers.cuda.device import Cuda, parse_device
 
 
@@ -72,8 +72,8 @@ def test_numbers_that_are_no_index_are_refused(index: object) -> None:
 
 def test_a_device_that_works_is_taken() -> None:
     """Nothing is said of a device that can be used, also with a driver later than CuPy."""
-    require_device(Driver(), 1)
-    require_device(Driver(version=14010, wanted=12090), 0)
+    require_driver(Driver(), 1)
+    require_driver(Driver(version=14010, wanted=12090), 0)
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_a_device_that_works_is_taken() -> None:
 def test_devices_that_cannot_be_used(driver: Driver, index: int, kind: type[Exception], words: str) -> None:
     """No driver, no device, no such device and a CuPy too new are told apart, each in one line."""
     with pytest.raises(kind, match=f"^{words}") as caught:
-        require_device(driver, index)
+        require_driver(driver, index)
     assert "\n" not in str(caught.value)
 
 

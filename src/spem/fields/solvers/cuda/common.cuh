@@ -24,12 +24,6 @@ __device__ inline float4 operator*(float4 a, float4 b) {
     return make_float4(a.x * b.x, a.y * b.y, a.z * b.z, a.w * b.w);
 }
 
-__device__ inline float4 operator/(float4 a, float4 b) {
-    return make_float4(a.x / b.x, a.y / b.y, a.z / b.z, a.w / b.w);
-}
-
-__device__ inline float4 operator*(float a, float4 b) { return make_float4(a * b.x, a * b.y, a * b.z, a * b.w); }
-
 __device__ inline float4 splat(float a) { return make_float4(a, a, a, a); }
 
 // a * b + c
@@ -117,16 +111,3 @@ __device__ inline double tile_sum(Quad value) { return tile_join(value, Sum()); 
 
 // Largest over the rows of a tile, one a lane, in threads 0..7.
 __device__ inline double tile_max(Quad value) { return tile_join(value, Largest()); }
-
-// Sum of one number of each thread of the block, returned by thread 0; all threads call it.
-__device__ inline double block_sum(double value) {
-    __shared__ double scratch[THREADS / 32];
-    for (int step = 16; step > 0; step /= 2) value += __shfl_xor_sync(0xffffffffu, value, step);
-    if (threadIdx.x % 32 == 0) scratch[threadIdx.x / 32] = value;
-    __syncthreads();
-    double result = 0;
-    if (threadIdx.x == 0)
-        for (int i = 0; i < THREADS / 32; i++) result += scratch[i];
-    __syncthreads();
-    return result;
-}

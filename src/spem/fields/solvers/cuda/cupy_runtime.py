@@ -37,7 +37,7 @@ def load_cupy(index: int) -> Any:
         state = "not installed" if missing else f"installed but cannot be imported ({error})"
         msg = f"CuPy is {state}; it comes with pip install 'spem[cuda]'"
         raise MissingExtraError(msg) from error
-    require_device(cupy.cuda.runtime, index)
+    require_driver(cupy.cuda.runtime, index)
     require_compiler(cupy.cuda.nvrtc)
     return cupy
 
@@ -51,7 +51,7 @@ def require_compiler(nvrtc: Any) -> None:
         raise MissingExtraError(msg) from error
 
 
-def require_device(driver: Any, index: int) -> None:
+def require_driver(driver: Any, index: int) -> None:
     """Raise a one-line error, as `load_cupy` does, unless ``cupy.cuda.runtime`` can use a device."""
     version, wanted = driver.driverGetVersion(), driver.runtimeGetVersion()
     if version == 0:
